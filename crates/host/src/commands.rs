@@ -96,6 +96,7 @@ impl Host {
             NodeCommand::Change(change) => self.change_parameters(node, change, asked),
             NodeCommand::Pdos(command) => self.take_pdos(node, command, asked),
             NodeCommand::Capture(command) => self.take_capture(node, command, asked),
+            NodeCommand::Tune(command) => self.take_tune(node, command, asked),
             NodeCommand::Jog { rpm } => self.take_jog(node, rpm, asked),
             NodeCommand::Drive(command) => self.take_motion(node, command, asked),
         }
@@ -145,7 +146,7 @@ impl Host {
                 ("busy", "it belongs to a group that is moving: stop the group first")
             }
             Some(_) if !stops && self.is_tested(id) => {
-                ("busy", "it makes a test motion: wait for its end, or stop it first")
+                ("busy", "it makes a test motion, or is being measured: wait for its end, or stop it first")
             }
             Some(drive) => return Some((drive, (seq, answer))),
         };
@@ -206,6 +207,7 @@ impl Host {
                 self.held_by = controller;
                 // The new session has not commanded anything yet.
                 self.accepted.clear();
+                self.tuned.clear();
             }
             self.presence = controller.map(|_| DeadMan::new(PRESENCE_SPAN, self.network.now()));
         }
@@ -246,6 +248,7 @@ impl Host {
             Done::Looked(asked, outcome) => self.conclude_looking(asked, outcome),
             Done::Written(asked, written) => self.conclude_writing(asked, *written),
             Done::Captured(asked, ended) => self.conclude_capture(asked, *ended),
+            Done::Tuned(asked, ended) => self.conclude_tuning(asked, *ended),
             Done::Learned(node, traffic) => self.conclude_learning(node, traffic),
             Done::PdosRead(asked, node, read) => self.conclude_reading_pdos(asked, node, *read),
             Done::PdosPlanned(asked, planned) => self.conclude_planning_pdos(asked, *planned),

@@ -105,6 +105,7 @@ impl Host {
         if self.authority.leave(session) {
             (self.presence, self.held_by) = (None, None);
             self.accepted.clear();
+            self.tuned.clear();
             self.stop_moved("the page that moved it has disconnected");
         }
     }

@@ -24,6 +24,7 @@ use crate::session::DeadMan;
 use crate::session::authority::{Authority, SessionId};
 use crate::session::handle::{HostHandle, Inbox, channel};
 use crate::trace::{Origin, Trace};
+use crate::tune::Tuned;
 use crate::wire::Wire;
 use crate::work::{Line, Listening, Running, Work};
 use crate::world::changes::Changes;
@@ -108,6 +109,8 @@ pub struct Host {
     pub(crate) captures: BTreeMap<NodeId, CaptureRun>,
     /// What was captured of each node, newest first, for its report.
     pub(crate) captured: BTreeMap<NodeId, Vec<report::Capture>>,
+    /// Gains that were proposed to the session that has control, and not tried yet.
+    pub(crate) tuned: BTreeMap<NodeId, Box<Tuned>>,
     /// The changes of the world.
     pub(crate) changes: Changes,
     /// Numbers the work that runs, so that the end of replaced work is not taken for the end of its replacement.
@@ -164,6 +167,7 @@ impl Host {
             parameters: Transactions::default(),
             captures: BTreeMap::new(),
             captured: BTreeMap::new(),
+            tuned: BTreeMap::new(),
             changes: Changes::default(),
             learning: BTreeMap::new(),
             traffic: BTreeMap::new(),

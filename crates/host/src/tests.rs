@@ -11,6 +11,7 @@ mod series;
 mod speed_limit;
 mod test_motion;
 mod trace;
+mod tune;
 mod world;
 
 use std::collections::{BTreeMap, VecDeque};

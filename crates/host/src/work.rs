@@ -23,6 +23,7 @@ use crate::parameters::transactions::{Refusal, Written};
 use crate::pdo::load::PlannedPdos;
 use crate::session::authority::SessionId;
 use crate::snapshot::DriveView;
+use crate::tune::TuneOutcome;
 use crate::world::door::NoAnswer;
 
 /// Everything under way.
@@ -73,6 +74,8 @@ pub(crate) enum Done {
     Written(Asked, Box<Written>),
     /// A capture has ended.
     Captured(Asked, Box<CaptureOutcome>),
+    /// A measurement for gains, or a trial of them, has ended.
+    Tuned(Asked, Box<TuneOutcome>),
     /// The world was read.
     LookedAround(Asked, Result<serde_json::Value, NoAnswer>),
     /// The world was changed, or not.

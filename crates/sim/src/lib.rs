@@ -53,7 +53,7 @@ pub mod task;
 pub mod wire;
 mod world;
 
-pub use block_on::{BlockOnError, block_on, block_on_for};
+pub use block_on::{BlockOnError, block_on, block_on_for, pass_beside, run_beside};
 pub use coupling::{BodyKind, BodyState, CoupledShaft, Coupling, CouplingError};
 pub use devices::AxisId;
 pub use drive::{

@@ -41,6 +41,9 @@ mod open_loop;
 mod response;
 mod samples;
 
+/// Speed per current at one frequency.
+pub use realfft::num_complex::Complex;
+
 pub use bode::bode;
 pub use controller::{Loop, identify_loop};
 pub use design::{Margins, Objective, Proposal, margins, propose, propose_position};

@@ -11,6 +11,7 @@ mod node;
 mod parameters;
 mod pdo;
 mod session;
+mod tune;
 
 pub use capture::{CaptureCommand, CaptureOrder, TestMotionOrder};
 pub use group::{AxisSpeed, AxisTarget, BaseJog, GroupCommand, GroupMove};
@@ -18,6 +19,7 @@ pub use node::NodeCommand;
 pub use parameters::{FileForm, NewValue, ParameterChange, ParameterReading};
 pub use pdo::{NewEntry, NewPdo, NmtChange, PdoCommand};
 pub use session::{SessionCommand, Topic, WorldCommand};
+pub use tune::TuneCommand;
 
 use canopen::NodeId;
 use serde::de::Error;
@@ -152,5 +154,6 @@ mod tests {
         assert_eq!(variants::<ParameterChange>(), ParameterChange::WORDS);
         assert_eq!(variants::<PdoCommand>(), PdoCommand::WORDS);
         assert_eq!(variants::<CaptureCommand>(), CaptureCommand::WORDS);
+        assert_eq!(variants::<TuneCommand>(), TuneCommand::WORDS);
     }
 }

@@ -4,6 +4,7 @@ use super::capture::CaptureCommand;
 use super::fields::{Fields, taken, whole};
 use super::parameters::{ParameterChange, ParameterReading};
 use super::pdo::PdoCommand;
+use super::tune::TuneCommand;
 use master::drive::{self, Manner};
 use master::units::{Amperes, Angle, Ramp, Rpm};
 
@@ -37,6 +38,8 @@ pub enum NodeCommand {
     Pdos(PdoCommand),
     /// A capture, or a report.
     Capture(CaptureCommand),
+    /// Gains, or ramps.
+    Tune(TuneCommand),
 }
 
 impl NodeCommand {
@@ -60,8 +63,12 @@ impl NodeCommand {
     ];
 
     pub(super) fn words() -> impl Iterator<Item = &'static str> {
-        let of_kinds = [ParameterReading::WORDS, ParameterChange::WORDS, PdoCommand::WORDS, CaptureCommand::WORDS];
-        of_kinds.into_iter().chain([Self::WORDS]).flatten().copied()
+        let (parameters, others) = (
+            [ParameterReading::WORDS, ParameterChange::WORDS],
+            [PdoCommand::WORDS, CaptureCommand::WORDS, TuneCommand::WORDS],
+        );
+        let of_kinds = parameters.into_iter().chain(others);
+        of_kinds.chain([Self::WORDS]).flatten().copied()
     }
 
     /// Whether it needs control.
@@ -78,6 +85,7 @@ impl NodeCommand {
             | Self::Change(_) => true,
             Self::Pdos(command) => command.needs_control(),
             Self::Capture(command) => command.needs_control(),
+            Self::Tune(command) => command.needs_control(),
         }
     }
 }
@@ -101,6 +109,9 @@ pub(super) fn read(word: &str, mut fields: Fields) -> Result<NodeCommand, String
     }
     if CaptureCommand::WORDS.contains(&word) {
         return whole(fields).map(NodeCommand::Capture);
+    }
+    if TuneCommand::WORDS.contains(&word) {
+        return whole(fields).map(NodeCommand::Tune);
     }
     fields.remove("do");
     let command = match word {

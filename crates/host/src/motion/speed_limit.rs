@@ -11,7 +11,7 @@ use master::group::AxisLimits;
 use master::units::{Along, Rpm};
 
 use crate::answer::Answer;
-use crate::command::{BaseJog, CaptureCommand, Command, GroupCommand, NodeCommand, TestMotionOrder};
+use crate::command::{BaseJog, CaptureCommand, Command, GroupCommand, NodeCommand, TestMotionOrder, TuneCommand};
 use crate::commands::done;
 use crate::parameters::transactions::Refusal;
 use crate::session::authority::SessionId;
@@ -38,6 +38,8 @@ impl Host {
         let is_lower = rpm.is_some_and(|rpm| before.is_none_or(|before| rpm < before));
         if is_lower && self.authority.controller() == Some(session) {
             self.stop_moved("a lower speed limit was set");
+            // Their trial would be as fast as their measurement.
+            self.tuned.clear();
         }
         done(asked);
     }
@@ -56,6 +58,8 @@ enum Speed {
     Rpm(f64),
     /// The speed set in the drive.
     AsSet,
+    /// That with which the model is usually measured.
+    UsualToMeasure,
     /// Any speed that its load allows.
     UpToTheLoad,
     /// So much along a way, and not known how many turns those are.
@@ -73,6 +77,7 @@ fn keeps_to(command: &Command, limit_rpm: f64, gears: &Gears) -> Result<(), Refu
             Err((TOO_FAST, format!("{:.1} r/min is {limit}: use a lower speed, or raise the limit", rpm.abs())))
         }
         Speed::AsSet => Err((TOO_FAST, format!("the speed set in the drive may be {limit}: give a speed"))),
+        Speed::UsualToMeasure => Err((TOO_FAST, format!("the usual speed may be {limit}: give a speed"))),
         Speed::UpToTheLoad => Err((
             TOO_FAST,
             format!("with a current the speed depends on the load and may be {limit}: remove the limit first"),
@@ -93,6 +98,10 @@ fn fastest(command: &Command, gears: &Gears) -> Speed {
         }
         Command::Node(_, NodeCommand::Capture(CaptureCommand::TestMotion(TestMotionOrder { motion, .. }))) => {
             Speed::Rpm(if motion.shape == ShapeName::Steps { motion.speed_rpm } else { motion.velocity_rpm })
+        }
+        // Without a speed it is that which is usual for the model. Gains are tried as fast as they were measured.
+        Command::Node(_, NodeCommand::Tune(TuneCommand::Tune(order))) => {
+            order.speed_rpm.map_or(Speed::UsualToMeasure, Speed::Rpm)
         }
         Command::Node(..) => Speed::None,
         Command::Group(command) => of_group(command),

@@ -26,7 +26,7 @@ use crate::answer::Answer;
 use crate::command::{FileForm, NewValue, ParameterChange, ParameterReading};
 use crate::parameters::journals::Journals;
 use crate::parameters::object_rows::{bytes_text, row_json, value_text};
-use crate::parameters::transactions::{Change, MOST_KEPT, Refusal, Written};
+use crate::parameters::transactions::{Change, Refusal, Written};
 use crate::state::Host;
 use crate::work::{Asked, Done, quietly, send};
 
@@ -162,19 +162,13 @@ impl Host {
     pub(crate) fn conclude_writing(&mut self, asked: Asked, written: Written) {
         let Written { node, outcome, before, change } = written;
         self.parameters.writing.remove(&node);
-        let kept = self.parameters.before.entry(node).or_default();
         match (&outcome, before) {
             // This was the rollback itself: it cannot be rolled back.
-            (Ok(_), _) if change == Change::Back => drop(kept.pop()),
-            (_, Some(before)) if change != Change::Back => {
-                if kept.len() == MOST_KEPT {
-                    kept.remove(0);
-                }
-                kept.push(before);
-            }
+            (Ok(_), _) if change == Change::Back => drop(self.parameters.before.entry(node).or_default().pop()),
+            (_, Some(before)) if change != Change::Back => self.parameters.keep(node, before),
             _ => {}
         }
-        let left = kept.len();
+        let left = self.parameters.can_roll_back(node);
         match &outcome {
             Err((_, text)) => self.send_news(Some(node), text),
             Ok(done) => {

@@ -8,7 +8,7 @@ use master::parameters::Parameters;
 use serde_json::Value;
 
 /// Most transactions of one node that can be rolled back.
-pub(crate) const MOST_KEPT: usize = 20;
+const MOST_KEPT: usize = 20;
 
 /// Why a command was refused: a word for programs, and a text for people.
 pub(crate) type Refusal = (&'static str, String);
@@ -39,6 +39,15 @@ impl Transactions {
             self.reading += 1;
         }
         is_free
+    }
+
+    /// Keeps the values before a transaction, for its rollback.
+    pub(crate) fn keep(&mut self, node: NodeId, before: Parameters) {
+        let kept = self.before.entry(node).or_default();
+        if kept.len() == MOST_KEPT {
+            kept.remove(0);
+        }
+        kept.push(before);
     }
 
     /// A node has stored its parameters.

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use canopen::NodeId;
-use futures_util::future::{AbortHandle, Abortable};
+use futures_util::future::{AbortHandle, AbortRegistration, Abortable};
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use recording::Capture;
@@ -55,12 +55,7 @@ impl Host {
         let way_back = WayBack::in_network(&self.setting.ways_back);
         let restorer = way_back.of(&drive).clone();
         let (world, accepted) = (self.true_values().cloned(), self.accepted.contains(&node));
-        let (abort, registration) = AbortHandle::new_pair();
-        self.generation += 1;
-        let generation = self.generation;
-        self.leave_lines(LineOf::Stop(node));
-        self.running.insert(node, Running::of_test_motion(generation, TESTING, abort.clone()));
-        self.captures.insert(node, CaptureRun { ended: None, abort });
+        let (generation, registration) = self.note_tested(node, TESTING);
         Ok(async move {
             let mut runs = Vec::new();
             let moving = async {
@@ -77,8 +72,18 @@ impl Host {
         })
     }
 
-    /// Whether a test motion can begin.
-    fn check_can_test(&self, node: NodeId) -> Result<(), Refusal> {
+    /// A motion begins that a stop ends, and whose way back ends it: its number, and what it is dropped by.
+    pub(crate) fn note_tested(&mut self, node: NodeId, what: &'static str) -> (u64, AbortRegistration) {
+        let (abort, registration) = AbortHandle::new_pair();
+        self.generation += 1;
+        self.leave_lines(LineOf::Stop(node));
+        self.running.insert(node, Running::of_test_motion(self.generation, what, abort.clone()));
+        self.captures.insert(node, CaptureRun { ended: None, abort });
+        (self.generation, registration)
+    }
+
+    /// Whether a test motion or a tuning can begin.
+    pub(crate) fn check_can_test(&self, node: NodeId) -> Result<(), Refusal> {
         // Both may end a SYNC of their own, and put TPDOs back.
         if let Some(other) = self.captures.keys().next() {
             return Err(("busy", format!("node {other} is being captured: wait for the end of that, or end it")));
@@ -97,7 +102,7 @@ impl Host {
         }
     }
 
-    /// True if a test motion of this node is under way, or on its way back.
+    /// True if a test motion or a tuning of this node is under way, or on its way back.
     pub(crate) fn is_tested(&self, node: NodeId) -> bool {
         self.captures.get(&node).is_some_and(|run| run.ended.is_none())
     }
@@ -105,12 +110,13 @@ impl Host {
     /// A test motion ends with SYNC, TPDOs and the NMT state as they were before it: nothing else captures meanwhile.
     pub(crate) fn check_no_test_motion(&self) -> Result<(), Refusal> {
         let tested = self.captures.iter().find(|(_, run)| run.ended.is_none());
-        let refused =
-            |node: &NodeId| ("busy", format!("node {node} makes a test motion: wait for its end, or stop it"));
+        let refused = |node: &NodeId| {
+            ("busy", format!("node {node} makes a test motion, or is being measured: wait for its end, or stop it"))
+        };
         tested.map_or(Ok(()), |(node, _)| Err(refused(node)))
     }
 
-    /// A test motion has ended, and its drive was brought to rest, or could not be.
+    /// A test motion or a tuning has ended, and its drive was brought to rest, or could not be.
     pub(crate) fn conclude_test_motion(&mut self, node: NodeId, generation: u64) {
         if self.running.get(&node).is_some_and(|running| running.generation == generation) {
             self.running.remove(&node);
@@ -123,7 +129,8 @@ impl Host {
     }
 }
 
-fn cyclic(period_ms: f64) -> CyclicOptions {
+/// How late a motion that a session commands may be.
+pub(crate) fn cyclic(period_ms: f64) -> CyclicOptions {
     let usual = CyclicOptions::default();
     let cycles = LATE.as_secs_f64() * 1e3 / period_ms;
     CyclicOptions { tolerance: (cycles as u32).max(usual.tolerance), ..usual }

@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::group_follow::stream;
 
+pub(crate) use commanded::cyclic;
 pub use order::{Order, ShapeName};
 pub use runs::{Figures, Motion, Run, Travel, limits, run, steps, usual_quantities};
 pub use shape::{Shape, points};

@@ -262,7 +262,7 @@ fn a_test_motion_beyond_a_limit_or_of_a_drive_that_nothing_stops_moves_nothing()
 
 impl Stage {
     /// Waits until the wheel turns.
-    async fn is_moving(&self) {
+    pub(super) async fn is_moving(&self) {
         for _ in 0..1000 {
             if self.speed(WHEEL).await > 10.0 {
                 return;
@@ -275,7 +275,7 @@ impl Stage {
 
 impl Page {
     /// The result of a command, for which the page stays.
-    async fn comes(&mut self, stage: &Stage, command: Command) -> Value {
+    pub(super) async fn comes(&mut self, stage: &Stage, command: Command) -> Value {
         let waiting = self.begin(command);
         let answer = self.stays(stage, waiting).await;
         assert_eq!(answer["ok"], true, "{answer}");
@@ -283,7 +283,7 @@ impl Page {
     }
 
     /// Says that it is there until the answer comes.
-    async fn stays(&mut self, stage: &Stage, mut waiting: Answered) -> Value {
+    pub(super) async fn stays(&mut self, stage: &Stage, mut waiting: Answered) -> Value {
         loop {
             tokio::select! {
                 answer = &mut waiting => {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use canopen::NodeId;
 use cia402::RAD_S_PER_RPM;
 use master::Drive;
 use master::parameters::Parameters;
@@ -23,9 +24,8 @@ const ANSWER_S: f64 = 0.5;
 const MORE_THAN_TWIN: f64 = 1.3;
 const BACK: &str = "it was given its former gains back";
 
-/// Measures a drive, finds gains, and has it try them, if that was asked for. It keeps them where its current does not swing, its
-/// error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what it had. What leads back from
-/// where it is given up on the way is in `restorer`.
+/// Measures a drive, finds gains, and has it [`try_gains`], if that was asked for. What leads back from where it is given up on the
+/// way is in `restorer`.
 ///
 /// # Errors
 /// What stopped it, what is not possible with this drive, that a journal of former gains is there already, and that not everything could
@@ -37,38 +37,67 @@ pub async fn tune(
     wants_back: impl Future<Output = bool>,
 ) -> Result<TuneReport, Failure> {
     let id = drive.node().id();
-    let former = request.journal.as_deref().map(former_gains);
     if request.apply {
         // Before anything moves.
-        former.as_deref().map_or(Ok(()), |path| Kept::check_free(path, id))?;
+        check_no_former(request, id)?;
     }
     let mut excursion = Excursion::default();
     progress.show(format!("node {id}: measuring, about half a minute"));
-    let (mut report, proposed) = find((drive, restorer), request, &mut excursion).await?;
+    let found = find((drive, restorer), request, &mut excursion).await?;
     if !request.apply {
-        return Ok(report);
+        return Ok(found.0);
     }
+    try_gains((drive, restorer), request, found, &mut excursion, progress, wants_back).await
+}
+
+/// The journal of an earlier tuning is not there.
+fn check_no_former(request: &Request, id: NodeId) -> Result<(), Failure> {
+    request.journal.as_deref().map(former_gains).map_or(Ok(()), |path| Kept::check_free(&path, id))
+}
+
+/// Has a drive try gains that were [found](find): a step with what it has, a transaction, the same step. It keeps them where its
+/// current does not swing, its error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what
+/// it had.
+///
+/// # Errors
+/// What stopped it, that its gains are others than those that were measured, that a journal of former gains is there already, and that
+/// not everything could be put back.
+pub async fn try_gains(
+    (drive, restorer): (&Drive, &Restorer),
+    request: &Request,
+    (mut report, proposed): (TuneReport, Proposed),
+    excursion: &mut Excursion,
+    progress: &impl Progress,
+    wants_back: impl Future<Output = bool>,
+) -> Result<TuneReport, Failure> {
+    let id = drive.node().id();
+    let former = request.journal.as_deref().map(former_gains);
+    check_no_former(request, id)?;
+    check_unchanged(drive, &proposed).await?;
     progress.show(format!("node {id}: a step with the gains that it has"));
     // The first thing that a step does to the current is proportional to it.
     let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
-    let before = step((drive, restorer), request, most_rpm, &mut excursion).await?;
+    let before = step((drive, restorer), request, most_rpm, excursion).await?;
     let undo = proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
     // Until the new gains are kept or gone: whatever ends the program meanwhile.
     keep((drive, restorer), former.as_deref(), undo, request.on_kept).await?;
     let after = match write(drive, request, &proposed, progress).await {
         Ok(()) => {
             progress.show(format!("node {id}: the same step with the new gains"));
-            step((drive, restorer), request, most_rpm, &mut excursion).await
+            step((drive, restorer), request, most_rpm, excursion).await
         }
         Err(failure) => Err(failure),
     };
-    (report.peak_a, report.travel_turns) = (excursion.peak_a, excursion.travel_turns);
+    report.peak_a = report.peak_a.max(excursion.peak_a);
+    report.travel_turns = report.travel_turns.max(excursion.travel_turns);
     // Why they do not stay: gains that were not seen to hold the shaft do not, whatever stopped it.
     let objection = match after {
         Err(failure) => Err(failure),
         Ok(after) => {
             report.drive_error = Some([before.error(), after.error()]);
-            match objection(&before, &after, request, &report) {
+            let why = objection(&before, &after, request, &report);
+            report.curves.drive = Some([before, after]);
+            match why {
                 None if wants_back.await => Ok(Some(BACK.to_owned())),
                 why => Ok(why.map(|why| format!("{why}: {BACK}"))),
             }
@@ -97,6 +126,21 @@ pub async fn tune(
     Ok(report)
 }
 
+/// What is led back to are the gains that were measured: nothing has written others since.
+async fn check_unchanged(drive: &Drive, proposed: &Proposed) -> Result<(), Failure> {
+    for gain in &proposed.gains {
+        let found = drive.node().upload(gain.object).await?;
+        let (found, measured) = (found.as_bytes(), bytes(drive, gain.object, gain.before));
+        if found != measured {
+            let id = drive.node().id();
+            return Err(Failure::new(format!("node {id}: {} is not what it was when it was measured", gain.object))
+                .at_node(id)
+                .next("measure it again"));
+        }
+    }
+    Ok(())
+}
+
 /// A journal that could not be deleted, which says nothing against what the drive has.
 fn noted(what_is: &str, Failure { what, because, next, .. }: Failure) -> String {
     [vec![format!("{what_is}, but {what}")], because, next].concat().join("; ")
@@ -105,14 +149,14 @@ fn noted(what_is: &str, Failure { what, because, next, .. }: Failure) -> String 
 /// Why the new gains do not stay.
 fn objection(before: &StepResponse, after: &StepResponse, request: &Request, report: &TuneReport) -> Option<String> {
     // The encoder's counts make the current ripple with high gains: on the twin as on the drive.
-    let of_twin_a = MORE_THAN_TWIN * report.twin_step.ripple_a();
+    let of_twin_a = MORE_THAN_TWIN * report.curves.twin[1].step.ripple_a();
     let most_a = before.ripple_a().max(SWINGS * request.bounds.current_a).max(of_twin_a);
     // A drive that is to be slower than it was may be off by more.
     let most_error = match request.objective {
         Objective::PhaseMargin(_) => before.error(),
         Objective::Bandwidth(_) => {
             let size = |answer: &StepResponse| answer.step_rpm.1 - answer.step_rpm.0;
-            let of_twin = report.twin_step.error() * size(after) / size(&report.twin_step);
+            let of_twin = report.curves.twin[1].step.error() * size(after) / size(&report.curves.twin[1].step);
             before.error().max(MORE_THAN_TWIN * of_twin)
         }
     };

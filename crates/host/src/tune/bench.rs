@@ -12,6 +12,7 @@ use master::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest}
 use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
 use master::units::{Amperes, Rpm};
 use master::{Drive, Network};
+use serde::Serialize;
 use tune::{Excitation, Samples, SteadyRun};
 use words::failure::{Failure, both};
 
@@ -94,7 +95,7 @@ pub struct Excursion {
 }
 
 /// How a drive answers a step of its set-point.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StepResponse {
     /// Time between two samples, s.
     pub period_s: f64,
@@ -128,6 +129,8 @@ fn ripple(values: &[f64], period_s: f64) -> f64 {
 
 /// What a failure is called where the current was at its bound.
 pub(super) const CURRENT_KIND: &str = "current_bound";
+/// Cycles until all TPDOs have come again.
+const SKIPPED: usize = 2;
 /// From one speed to the next, and until it is steady.
 const RAMP_S: f64 = 0.3;
 const SETTLING_S: f64 = 0.4;
@@ -246,6 +249,10 @@ impl Bench {
 
     /// Whether the drive follows within [`ENABLING_S`].
     async fn enable(&mut self) -> Result<bool, Failure> {
+        // What came in the last cycle of a motion that was dropped counts as new until it comes again: its statusword shows power.
+        for _ in 0..SKIPPED {
+            self.network.next_sync().await.map_err(|error| self.stopped(error))?;
+        }
         for _ in 0..self.cycles(ENABLING_S) {
             if self.step(Demand::Hold).await?.0.follows {
                 return Ok(true);

@@ -10,8 +10,12 @@
 
 mod applied;
 mod bench;
+mod commanded;
+mod curves;
 mod found;
 mod measure;
+mod order;
+mod outcome;
 mod proposed;
 mod ramps;
 mod ramps_twin;
@@ -21,10 +25,13 @@ mod setup;
 mod twin;
 
 pub use ::tune::Objective;
-pub use applied::{step, tune};
+pub use applied::{step, try_gains, tune};
 pub use bench::{Bench, Bounds, Excursion, Measurement, StepResponse};
+pub use curves::{Curves, GainAndPhase, ResponseRow};
 pub use found::Found;
 pub use measure::measure;
+pub use order::{LoadOrder, Order};
+pub(crate) use outcome::{TuneOutcome, Tuned};
 pub use proposed::{Gain, Proposed, Unreachable};
 pub use ramps::{RampReport, RampRequest, open_loop_of, tune_ramps};
 pub use ramps_twin::TwinRow;

@@ -347,17 +347,17 @@ impl Known {
     }
 
     /// Values with which the twin keeps in step under a load as many times as large as the margin, and what it lost.
-    fn proved(&self, request: &RampRequest) -> Result<(Values, Vec<TwinRow>, i32), Failure> {
+    async fn proved(&self, request: &RampRequest) -> Result<(Values, Vec<TwinRow>, i32), Failure> {
         let mut lost = Vec::new();
         for more in 0..CORRECTIONS {
             let values = self.propose(request, request.margin * CAREFUL.powi(more))?;
             let rotor = self.rotor(&values, request);
-            lost = [1.0, request.margin].into_iter().map(|load| rotor.turned(load)).collect::<Result<Vec<_>, _>>()?;
+            lost = vec![rotor.turned(1.0).await?, rotor.turned(request.margin).await?];
             if lost.iter().any(|row| row.lost_steps != Some(0)) {
                 continue;
             }
             for beyond in BEYOND {
-                let row = rotor.turned(request.margin * beyond)?;
+                let row = rotor.turned(request.margin * beyond).await?;
                 lost.push(row);
                 if row.lost_steps != Some(0) {
                     break;
@@ -421,7 +421,7 @@ pub async fn tune_ramps(drive: &Drive, request: &RampRequest, progress: &impl Pr
     let known = Known::of(drive, request).await?;
     let id = drive.node().id();
     progress.show(format!("node {id}: its twin turns"));
-    let (values, twin, more) = known.proved(request)?;
+    let (values, twin, more) = known.proved(request).await?;
     let value = |object: Mux| values.iter().find(|(other, _)| *other == object).map_or(0, |(_, value)| *value);
     let (current, up, start) = (known.open_loop.current, known.objects.up, known.objects.start);
     let (had_a, current_a) = (known.current_a(known.had(current)), known.current_a(value(current)));

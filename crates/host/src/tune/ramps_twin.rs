@@ -52,7 +52,7 @@ pub(super) struct Rotor {
 
 impl Rotor {
     /// Up to its speed and back in both directions, with all that it turns so many times as large.
-    pub(super) fn turned(&self, load: f64) -> Result<TwinRow, Failure> {
+    pub(super) async fn turned(&self, load: f64) -> Result<TwinRow, Failure> {
         let failed = |reason: &dyn std::fmt::Display| {
             Failure::new(format!("the twin of a {}, not the drive, failed its trial", self.model.title)).because(reason)
         };
@@ -67,23 +67,23 @@ impl Rotor {
             ),
         ];
         let (mut world, drive) = world_of(self.model, Fidelity::Full, &words)?;
-        world.run_for(BOOT);
+        sim::pass_beside(&mut world, BOOT).await;
         let begin = async {
             for (object, value) in &self.values {
                 write(&drive, *object, *value).await?;
             }
             drive.enable().await.map_err(Failure::from)
         };
-        sim::block_on(&mut world, begin).map_err(|error| failed(&error))??;
-        world.run_for(STEADY);
+        sim::run_beside(&mut world, begin).await.map_err(|error| failed(&error))??;
+        sim::pass_beside(&mut world, STEADY).await;
         let before = self.ahead(&mut world)?;
         // Held by now: a free shaft would fall.
         bring_about(&mut world, &Stimulus::LoadTorque(all.load_nm)).map_err(|reason| failed(&reason))?;
         let (mut slipped, mut lost_steps) = (0, 0);
         for speed_rpm in [self.speed_rpm, 0.0, -self.speed_rpm, 0.0] {
             let turn = drive.velocity(Rpm(speed_rpm), MotionOptions { wait: false, ..MotionOptions::default() });
-            let turned = sim::block_on(&mut world, turn).map_err(|error| failed(&error))?;
-            world.run_for(self.ramp + STEADY);
+            let turned = sim::run_beside(&mut world, turn).await.map_err(|error| failed(&error))?;
+            sim::pass_beside(&mut world, self.ramp + STEADY).await;
             let report = world.report(NODE.raw()).map_err(|error| failed(&error))?;
             if report.error_code != 0 {
                 return Ok(TwinRow { load, lost_steps: None });

@@ -10,14 +10,14 @@ use master::Drive;
 use master::cyclic::CyclicOptions;
 use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
-use tune::{Margins, Objective, Unusable};
+use tune::{Margins, Mechanics, Objective, Unusable};
 use words::failure::{Failure, both};
 
 use crate::capture::Restorer;
 
 use super::{
-    Bounds, Currents, Excursion, Found, Measurement, OutputLoad, Proposed, Reader, Setup, Shaft, StepResponse, Trial,
-    Twin, Unreachable, loops_of, measure, motor_of,
+    Bounds, Currents, Curves, Excursion, Found, GainAndPhase, Measurement, OutputLoad, Proposed, Reader, ResponseRow,
+    Setup, Shaft, StepResponse, Trial, Twin, Unreachable, loops_of, measure, motor_of,
 };
 
 /// How often the load of a twin is corrected, and the relative difference at which it is right.
@@ -142,9 +142,9 @@ pub struct TuneReport {
     pub position: Option<MarginRow>,
     /// A step of the set-point and a load on the twin: integral of the absolute error, r/min s, before and after.
     pub twin_error: [f64; 2],
-    /// Of the step alone, with the proposed values.
+    /// What of it is drawn.
     #[serde(skip)]
-    pub twin_step: StepResponse,
+    pub curves: Curves,
     /// The same of a step on the drive, once the values were tried there.
     pub drive_error: Option<[f64; 2]>,
     /// The drive has the proposed values.
@@ -211,20 +211,21 @@ pub async fn find(
     let how = (request.period, request.bounds);
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
     let had = Setup::begin((drive, restorer), (model, loops), true, journal, on_kept).await?;
-    let (found, twin, twin_off) = match (loops.demand, loops.stated, motor.gear) {
+    let (found, twin, twin_off, response) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
             let currents = both(currents(drive, &had, request, excursion).await, had.put_back(drive).await)?;
             let shaft = Shaft { motor: &motor, gear: &gear, stated: &stated };
-            by_readings((model, loops), &shaft, &had, (&currents, how.1))?
+            let (found, twin, off) = by_readings((model, loops), &shaft, &had, (&currents, how.1)).await?;
+            (found, twin, off, Vec::new())
         }
         _ => {
             let measured = measure(drive, &had, loops, (how.0, how.1, request.cyclic), excursion).await;
             let measured = both(measured, had.put_back(drive).await)?;
             let found = Found::of(&measured, &had, loops, &motor).map_err(|error| failed(&error))?;
             let twin = Twin::new((model, loops), &found, &motor, gains_of(&had, loops));
-            let of_twin = twin.measure(&had.lowered(measured.gain_share), how)?;
-            let off = between(&measured, &of_twin).map_err(|error| failed(&error))?;
-            (found, twin, off)
+            let of_twin = twin.measure(&had.lowered(measured.gain_share), how).await?;
+            let (off, response) = between(&measured, &of_twin, &found.plant).map_err(|error| failed(&error))?;
+            (found, twin, off, response)
         }
     };
     let proposed = Proposed::of(&found, &had, (model, loops), request.objective, request.with_position);
@@ -237,14 +238,15 @@ pub async fn find(
     let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
     // On the twin a large current does no harm.
     let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
-    let trials = [twin.try_out(&[], wide)?, twin.try_out(&after, wide)?];
-    let report = TuneReport {
+    let trials = [twin.try_out(&[], wide).await?, twin.try_out(&after, wide).await?];
+    let mut report = TuneReport {
         twin_off,
         peak_a: excursion.peak_a,
         travel_turns: excursion.travel_turns,
         notes: notes(&found, &proposed, request),
         ..rows(id.raw(), model, &found, &proposed, &trials)
     };
+    report.curves.response = response;
     Ok((report, proposed))
 }
 
@@ -267,7 +269,7 @@ async fn currents(
 ///
 /// # Errors
 /// What stopped the twin.
-pub(super) fn by_readings(
+pub(super) async fn by_readings(
     (model, loops): (&'static Description, &devices::Loops),
     shaft: &Shaft<'_>,
     had: &Setup,
@@ -277,7 +279,7 @@ pub(super) fn by_readings(
     let wide = Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..bounds };
     let (mut load, mut best) = (OutputLoad::default(), None::<(f64, OutputLoad)>);
     for _ in 0..CORRECTIONS {
-        let of_twin = twin_with((model, loops), &load, shaft, had).currents(wide)?;
+        let of_twin = twin_with((model, loops), &load, shaft, had).currents(wide).await?;
         let off = currents.off(&of_twin);
         if best.is_none_or(|(least, _)| off < least) {
             best = Some((off, load));
@@ -328,7 +330,7 @@ fn rows(node: u8, model: &Description, found: &Found, proposed: &Proposed, trial
         after: proposed.after.into(),
         position: proposed.position.map(MarginRow::from),
         twin_error: [trials[0].error(), trials[1].error()],
-        twin_step: trials[1].step.clone(),
+        curves: Curves { response: Vec::new(), twin: trials.clone(), drive: None },
         drive_error: None,
         applied: false,
         notes: Vec::new(),
@@ -351,15 +353,27 @@ fn gains_of(setup: &Setup, loops: &devices::Loops) -> Vec<(Mux, i64)> {
     all.filter_map(|object| Some((object, setup.had(object)?))).collect()
 }
 
-/// How far the responses of drive and twin are apart where both are coherent: per current demand, as each was measured.
-fn between(drive: &Measurement, twin: &Measurement) -> Result<f64, Unusable> {
+/// How far the responses of drive and twin are apart where both are coherent: per current demand, as each was measured. And both, with
+/// that of the model.
+fn between(drive: &Measurement, twin: &Measurement, model: &Mechanics) -> Result<(f64, Vec<ResponseRow>), Unusable> {
     let response = |it: &Measurement| tune::response(&it.samples, Some(&it.excitation));
     let (drive, twin) = (response(drive)?, response(twin)?);
     let nearest = |omega: f64| {
         let off = |line: &&tune::Line| (line.omega() - omega).abs();
-        twin.lines.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|line| line.plant)
+        twin.lines.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|line| line.plant).unwrap_or_default()
     };
-    Ok(tune::distance(&drive, |omega| nearest(omega).unwrap_or_default()))
+    let row = |line: &tune::Line| {
+        let of =
+            |value: tune::Complex<f64>| GainAndPhase { db: 20.0 * value.norm().log10(), deg: value.arg().to_degrees() };
+        ResponseRow {
+            hz: line.hz,
+            coherence: line.coherence,
+            drive: of(line.plant),
+            model: of(model.response(line.omega())),
+            twin: of(nearest(line.omega())),
+        }
+    };
+    Ok((tune::distance(&drive, nearest), drive.lines.iter().map(row).collect()))
 }
 
 fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
@@ -383,7 +397,7 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
     }
     if request.torque_constant_nm_a.is_none() {
         notes.push(format!(
-            "inertia and friction are those of a motor with {:.3} N m/A, the model's own: --torque-constant gives another",
+            "inertia and friction are those of a motor with {:.3} N m/A, the model's own; with another torque constant they are others",
             found.torque_constant_nm_a
         ));
     }

@@ -8,6 +8,7 @@ use canopen::{Mux, NodeId};
 use devices::{AxisId, Description, Loops};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
+use serde::Serialize;
 use sim::machine::{Order, order};
 use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, StepperData, World};
 use words::failure::Failure;
@@ -17,6 +18,7 @@ use super::found::Found;
 use super::readings::{Currents, Reader};
 
 pub(super) const NODE: NodeId = NodeId::MIN;
+const BOOT: Duration = Duration::from_secs(1);
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
 /// The load that comes on, by the current that holds it.
@@ -41,7 +43,7 @@ pub struct Twin {
 }
 
 /// How a drive behaves with some gains.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
     /// A step of the set-point.
     pub step: StepResponse,
@@ -154,15 +156,22 @@ impl Twin {
     /// # Errors
     /// The model cannot be built, or has not what hangs on its shaft.
     pub fn world(&self) -> Result<(World, Drive), Failure> {
-        self.world_at(Fidelity::Full)
+        let (mut world, drive) = self.unbooted(Fidelity::Full)?;
+        world.run_for(BOOT);
+        Ok((world, drive))
     }
 
-    fn world_at(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
+    async fn booted(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
+        let (mut world, drive) = self.unbooted(fidelity)?;
+        sim::pass_beside(&mut world, BOOT).await;
+        Ok((world, drive))
+    }
+
+    fn unbooted(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
         let (mut world, drive) = world_of(self.model, fidelity, &self.load)?;
         if self.load_nm != 0.0 {
             self.push(&mut world, self.load_nm)?;
         }
-        world.run_for(Duration::from_secs(1));
         Ok((world, drive))
     }
 
@@ -175,40 +184,40 @@ impl Twin {
     ///
     /// # Errors
     /// What stopped it.
-    pub fn measure(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Measurement, Failure> {
-        let (mut world, drive) = self.world()?;
+    pub async fn measure(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Measurement, Failure> {
+        let (mut world, drive) = self.booted(Fidelity::Full).await?;
         let excitation = excitation(how.0)?;
-        self.run(&mut world, async { self.open(&drive, values, how).await?.measure(&excitation).await })
+        self.run(&mut world, async { self.open(&drive, values, how).await?.measure(&excitation).await }).await
     }
 
     /// How it behaves with these values of its gains: a step of the set-point, and a load.
     ///
     /// # Errors
     /// What stopped it.
-    pub fn try_out(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Trial, Failure> {
-        let (mut world, drive) = self.world()?;
+    pub async fn try_out(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<Trial, Failure> {
+        let (mut world, drive) = self.booted(Fidelity::Full).await?;
         let (step, load) = match self.loops.demand {
-            Some(_) => self.trial_of_samples(&mut world, &drive, values, how)?,
-            None => self.trial_of_readings(&mut world, &drive, values, how.1)?,
+            Some(_) => self.trial_of_samples(&mut world, &drive, values, how).await?,
+            None => self.trial_of_readings(&mut world, &drive, values, how.1).await?,
         };
         Ok(Trial { step, load })
     }
 
-    fn trial_of_samples(
+    async fn trial_of_samples(
         &self,
         world: &mut World,
         drive: &Drive,
         values: &[(Mux, i64)],
         how: (Duration, Bounds),
     ) -> Result<(StepResponse, StepResponse), Failure> {
-        let mut bench = self.run(world, self.open(drive, values, how))?;
-        let step = self.run(world, bench.step_response(f64::MAX, ANSWER_S))?;
+        let mut bench = self.run(world, self.open(drive, values, how)).await?;
+        let step = self.run(world, bench.step_response(f64::MAX, ANSWER_S)).await?;
         self.push(world, self.load_nm + LOAD_A * self.torque_constant_nm_a)?;
-        let load = self.run(world, bench.hold_response(ANSWER_S))?;
+        let load = self.run(world, bench.hold_response(ANSWER_S)).await?;
         Ok((step, load))
     }
 
-    fn trial_of_readings(
+    async fn trial_of_readings(
         &self,
         world: &mut World,
         drive: &Drive,
@@ -217,10 +226,10 @@ impl Twin {
     ) -> Result<(StepResponse, StepResponse), Failure> {
         let answer = Duration::from_secs_f64(ANSWER_S);
         let mut reader = Reader::of(drive, bounds, Excursion::default())?;
-        self.run(world, self.write(drive, values))?;
-        let step = self.run(world, reader.step_response(f64::MAX, answer))?;
+        self.run(world, self.write(drive, values)).await?;
+        let step = self.run(world, reader.step_response(f64::MAX, answer)).await?;
         self.push(world, self.load_nm + OUTPUT_LOAD_A * self.torque_constant_nm_a * self.ratio)?;
-        let load = self.run(world, reader.hold_response(answer))?;
+        let load = self.run(world, reader.hold_response(answer)).await?;
         Ok((step, load))
     }
 
@@ -228,12 +237,12 @@ impl Twin {
     ///
     /// # Errors
     /// What stopped it.
-    pub fn currents(&self, bounds: Bounds) -> Result<Currents, Failure> {
+    pub async fn currents(&self, bounds: Bounds) -> Result<Currents, Failure> {
         // What is shown is filtered: nothing of a current loop is seen in it.
-        let (mut world, drive) = self.world_at(Fidelity::Mechanical)?;
+        let (mut world, drive) = self.booted(Fidelity::Mechanical).await?;
         let mut reader = Reader::of(&drive, bounds, Excursion::default())?;
-        self.run(&mut world, self.write(&drive, &[]))?;
-        self.run(&mut world, reader.measure())
+        self.run(&mut world, self.write(&drive, &[])).await?;
+        self.run(&mut world, reader.measure()).await
     }
 
     async fn write(&self, drive: &Drive, values: &[(Mux, i64)]) -> Result<(), Failure> {
@@ -243,7 +252,7 @@ impl Twin {
         Ok(())
     }
 
-    fn run<T>(&self, world: &mut World, what: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
-        sim::block_on(world, what).map_err(|error| self.failed(error))?.map_err(|failure| self.stopped(failure))
+    async fn run<T>(&self, world: &mut World, what: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+        sim::run_beside(world, what).await.map_err(|error| self.failed(error))?.map_err(|failure| self.stopped(failure))
     }
 }

@@ -13,7 +13,8 @@ use host::capture::Restorer;
 use host::network::Progress;
 use host::network::params::journal::roll_back_by;
 use host::tune::{
-    Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Twin, find, loops_of, measure, motor_of, tune,
+    Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Trial, Twin, find, loops_of, measure, motor_of,
+    tune,
 };
 use master::cyclic::CyclicOptions;
 use master::drive::{MotionOptions, SwitchedOff};
@@ -160,7 +161,7 @@ fn random_wheels_are_identified_and_gains_proposed_for_them_are_stable_and_nearl
         let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
         // The plant itself, with a step of the set-point and of the load.
         let how = (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() });
-        let (old, new) = (plant.try_out(&[], how).unwrap(), plant.try_out(&after, how).unwrap());
+        let (old, new) = (tried(&plant, &[], how), tried(&plant, &after, how));
         // A slow loop may still be on its way at the end: it comes nearer, and does not swing.
         let off = |answer: &StepResponse, last: usize| {
             let from = answer.speed_rpm.len() - last;
@@ -228,6 +229,11 @@ pub(crate) fn request() -> Request {
 }
 
 /// A wheel with a load of these words.
+/// What a twin does with these values; it is computed beside a world in which nothing happens.
+pub(crate) fn tried(twin: &Twin, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Trial {
+    sim::block_on(&mut World::new(Bitrate::M1, 1), twin.try_out(values, how)).unwrap().unwrap()
+}
+
 fn wheel(load: &[&str]) -> Twin {
     let model = devices::model("zlac8030l").unwrap();
     let loops = model.axes[0].loops.as_ref().unwrap();
@@ -426,7 +432,7 @@ fn a_load_that_pushes_all_the_time_pushes_the_twin_too() {
     let load_a = found.friction.load_a;
     assert!(relative(load_a * motor.windings.torque_constant_nm_a(), 1.5) < 0.05, "{load_a}");
     let twin = Twin::new(model, &found, &motor, Vec::new());
-    let trial = twin.try_out(&[], (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() })).unwrap();
+    let trial = tried(&twin, &[], (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() }));
     let speed = trial.load.step_rpm.1 * cia402::RAD_S_PER_RPM;
     let held_a = found.friction.dry_a + found.friction.viscous_a_s_rad * speed + load_a;
     let steady_a = |answer: &StepResponse| answer.current_a[answer.current_a.len() - 100..].iter().sum::<f64>() / 100.0;

@@ -11,6 +11,8 @@ use master::units::Rpm;
 use sim::machine::TimingMode;
 use sim::{MotorData, Place, Prng, Stimulus};
 
+use crate::tune::tried;
+
 /// What the plant has at the motor's shaft: closed forms of its own equations (`plant::gear`).
 struct Truth {
     inertia_kg_m2: f64,
@@ -113,7 +115,7 @@ fn random_joints_are_identified_and_gains_proposed_for_them_are_stable_and_bette
             })
             .collect();
         let how = (Duration::from_millis(1), Bounds { current_a: 30.0, speed_rpm: 600.0, ..Bounds::default() });
-        let (old, new) = (plant.try_out(&[], how).unwrap(), plant.try_out(&after, how).unwrap());
+        let (old, new) = (tried(&plant, &[], how), tried(&plant, &after, how));
         for answer in [&new.step, &new.load] {
             let last = &answer.speed_rpm[answer.speed_rpm.len() * 3 / 4..];
             let end = last.iter().map(|rpm| (rpm - answer.step_rpm.1).abs()).fold(0.0, f64::max);
