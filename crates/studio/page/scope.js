@@ -26,6 +26,7 @@ import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
 import { MOST_KEPT } from "./test_motion.js";
 import { testMotionPanel } from "./test_motion_panel.js";
+import { tunePanel } from "./tune_panel.js";
 import { trigger } from "./scope_trigger.js";
 import { inUnit, unitsOf } from "./units.js";
 
@@ -78,6 +79,7 @@ export function scopeView(shared, report) {
     for (const capture of made.slice(0, MOST_KEPT)) await captures.keep(capture);
     if (made.length) openCapture(made[0]);
   } });
+  const gains = tunePanel(shared, report);
   const scales = new Scales(before.scales);
   /** The units that were chosen, by field; the panes as they are without; what a turn of each node moves. */
   const units = before.units ?? {};
@@ -103,6 +105,7 @@ export function scopeView(shared, report) {
     captures.root,
     fast.root,
     bench.root,
+    gains.root,
     computed.root,
     h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), button("scope-save", "CSV", saveCsv, "A record, for ferrodrive plot and spreadsheets"), button("scope-mcap", "MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "SVG", saveSvg)),
     saved,
@@ -455,6 +458,7 @@ export function scopeView(shared, report) {
     choose.update(state);
     fast.update(state);
     bench.update(state);
+    gains.update(state);
     for (const { node, feed_m } of state.nodes) feeds.set(node, feed_m);
     drives = state.nodes.filter((node) => node.drive).map((node) => node.node);
     const more = drives.filter((node) => node !== shared.node);

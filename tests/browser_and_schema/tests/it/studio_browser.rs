@@ -9,6 +9,7 @@ mod figures;
 mod group;
 mod help;
 mod homing;
+mod measuring;
 mod pdo;
 mod safety;
 mod scope;

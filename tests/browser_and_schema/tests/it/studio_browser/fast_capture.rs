@@ -11,14 +11,14 @@ impl Stage {
         self.find("[data-quantity=target_velocity]").await;
     }
 
-    async fn fill(&self, css: &str, text: &str) {
+    pub(super) async fn fill(&self, css: &str, text: &str) {
         let fill = "const of = document.querySelector(arguments[0]); of.value = arguments[1]; of.dispatchEvent(new Event('change'))";
         self.client.execute(fill, vec![css.into(), text.into()]).await.expect("it is filled in");
     }
 
     /// Clicks until this is said; again whenever the button can be clicked and it is not: a page of a busy machine sends nothing while its
     /// state is stale, and has to take control again where its connection was silent for too long.
-    async fn has_done(&self, button: &str, status: &str, part: &str) -> String {
+    pub(super) async fn has_done(&self, button: &str, status: &str, part: &str) -> String {
         let click = "const [button, status, part] = arguments; const said = document.querySelector(status).textContent; \
                      if (said.includes(part)) return said; \
                      document.querySelector('#take')?.click(); const of = document.querySelector(button); \
