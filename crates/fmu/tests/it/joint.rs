@@ -177,6 +177,31 @@ fn motion_in_and_torque_out_is_a_worlds_exchange_to_the_last_bit() {
     }
 }
 
+/// Behind a reducer, with a stepper, of a described servo: whatever has a shaft. What has none is refused when it is packed.
+#[test]
+fn every_model_with_a_shaft_takes_a_joint() {
+    for spec in ["m4230e17b50@4", "zlim42c@4", "cia402@4"] {
+        let mut wheel = Stepped::drive(spec, Rule::Integrate);
+        let (mut world, _) = world(spec, Some(Rule::Integrate));
+        let inertia_kg_m2 = 2.0 * wheel.real("joint_inertia");
+        assert!(inertia_kg_m2 > 0.0, "{spec}");
+        let stiffness_nm_rad = 400.0 * inertia_kg_m2;
+        let mut joint = Joint { inertia_kg_m2, stiffness_nm_rad, rest_rad: 1.0, ..Joint::default() };
+        for step in 0..300 {
+            let mut expected = [0.0];
+            world.exchange(DT, (&[joint.angle_rad], &[joint.velocity_rad_s]), &mut expected).unwrap();
+            let torque_nm = wheel.exchange(DT_S, joint.motion());
+            assert_eq!(torque_nm.to_bits(), expected[0].to_bits(), "{spec} step {step}: {torque_nm} {expected:?}");
+            joint.step(DT_S, torque_nm);
+        }
+        assert!(joint.angle_rad != 0.0, "{spec}: {joint:?}");
+    }
+    for spec in ["io401@5", "encoder406@5"] {
+        let error = Unit::new(&Config::Drive(config(spec, Rule::Hold)), ".".as_ref()).err().unwrap().to_string();
+        assert!(error.contains("drive 5 moves no shaft"), "{error}");
+    }
+}
+
 /// A torsion spring at a drive that is not enabled, in three ways: the world's own load, by its torque, and as the importer's joint.
 #[test]
 fn both_forms_swing_as_the_worlds_own_spring() {
