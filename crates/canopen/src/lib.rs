@@ -3,7 +3,7 @@
 //! No I/O, no clock, no allocation. Frames and `now` go in; frames, deadlines and events come out.
 //! What a device offers is data: a [`od::Table`] of object rows, known when it is compiled or read from a file.
 //! [`od::Dictionary`] holds the values, [`node::Node`] joins all services of a device over them, [`sdo::Client`] is the
-//! other side of an SDO channel. A firmware has its values in arrays ([`od::Fixed`]), a program that learns of its objects
+//! other side of an SDO channel, [`node::SdoClient`] that of one which the device's own record names. A firmware has its values in arrays ([`od::Fixed`]), a program that learns of its objects
 //! at run time in boxes ([`od::Storage`]).
 //!
 //! A temperature sensor with a name that can be written, and its temperature in TPDO 1 whenever it changes:
