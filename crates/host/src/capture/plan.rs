@@ -142,7 +142,7 @@ fn records(model: &Description, objects: &[Mux]) -> Result<Vec<MappingRecord>, (
 
 fn is_spare((config, cob_id): &(PdoConfig, CobId), request: &Request<'_>) -> bool {
     !cob_id.is_valid()
-        || config.map.0.is_empty()
+        || config.is_empty()
         || config.transmission.is_synchronous() && request.sync.is_none()
         || request.take.contains(&config.pdo)
 }

@@ -52,6 +52,9 @@ impl TimerUnits {
     }
 }
 
+/// Of a multiplexed PDO. Source: CiA 301, 7.2.3.
+const MPDO_BYTES: usize = 8;
+
 /// How one PDO of a device is set up.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoConfig {
@@ -97,6 +100,16 @@ impl PdoConfig {
     pub const fn event_time(mut self, time: Duration) -> Self {
         self.event_time = Some(time);
         self
+    }
+
+    /// Neither objects are mapped, nor is it multiplexed.
+    pub fn is_empty(&self) -> bool {
+        self.map.0.is_empty() && self.multiplexed.is_none()
+    }
+
+    /// Bytes of a frame of it.
+    pub fn bytes(&self) -> usize {
+        if self.multiplexed.is_some() { MPDO_BYTES } else { self.map.bytes() }
     }
 
     pub(super) const fn parameter(&self, sub_index: u8) -> Mux {

@@ -57,7 +57,7 @@ pub fn why_silent(config: &PdoConfig, cob_id: CobId, situation: &Situation) -> V
     if !cob_id.is_valid() {
         return vec![Silence::Off];
     }
-    if config.map.bits() == 0 && config.multiplexed.is_none() {
+    if config.bytes() == 0 {
         return vec![Silence::Empty];
     }
     let mut reasons = Vec::new();

@@ -68,6 +68,7 @@ fn a_multiplexed_pdo_is_read_and_another_mapping_takes_its_place_or_leaves_it() 
     let node = bus.network.node(node(4));
     let (read, _) = bus.block_on(node.pdo_config(TPDO1, HALF_MS)).unwrap();
     assert_eq!(read.when(), "multiplexed, by source address");
+    assert!(!read.is_empty() && read.bytes() == 8);
     assert_eq!((read.multiplexed, read.map), (Some(AddressMode::Source), PdoMap::default()));
     let config = PdoConfig::new(TPDO1, position_and_speed());
     bus.block_on(node.configure_pdo(&config, HALF_MS)).unwrap();

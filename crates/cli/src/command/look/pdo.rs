@@ -155,8 +155,7 @@ impl WatchPdo {
         let mut sends = 0;
         for (config, cob_id) in drive.pdos().await? {
             if let Some(id) = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid()) {
-                let is_used = !config.map.0.is_empty() || config.multiplexed.is_some();
-                sends += usize::from(config.pdo.direction == Direction::Tpdo && is_used);
+                sends += usize::from(config.pdo.direction == Direction::Tpdo && !config.is_empty());
                 decoder.set_pdo(self.node, &config, id);
             }
         }

@@ -35,7 +35,7 @@ struct Reason {
 
 /// The PDOs that are mapped or switched on.
 pub(super) fn seen(seen: &Observed) -> Vec<PdoSeen> {
-    let used = seen.pdos.iter().filter(|(config, cob_id)| cob_id.is_valid() || !config.map.0.is_empty());
+    let used = seen.pdos.iter().filter(|(config, cob_id)| cob_id.is_valid() || !config.is_empty());
     used.map(|(config, cob_id)| PdoSeen {
         pdo: config.pdo,
         id: cob_id.can_id().raw(),
@@ -95,7 +95,7 @@ fn reason(seen: &Observed, config: &PdoConfig, cob_id: CobId) -> Option<Reason> 
     if is_tpdo {
         return Some(unsent(config, seen));
     }
-    let (shortest, mapped) = (usize::from(heard?.shortest), config.map.bytes());
+    let (shortest, mapped) = (usize::from(heard?.shortest), config.bytes());
     (shortest < mapped).then(|| Reason {
         rule: "pdo_too_short",
         is_finding: true,

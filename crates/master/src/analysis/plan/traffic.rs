@@ -322,7 +322,8 @@ fn of_host(nodes: &[NodeTraffic], settings: &Settings) -> Vec<Draft> {
     for node in nodes {
         for (config, cob_id) in node.pdos.iter().filter(|(config, cob_id)| is_sent(config, *cob_id)) {
             let is_sent = node.in_cycle.is_none_or(|number| number == config.pdo.number);
-            if config.pdo.direction == Direction::Rpdo && is_sent {
+            // What a multiplexed one is sent for is not known.
+            if config.pdo.direction == Direction::Rpdo && config.multiplexed.is_none() && is_sent {
                 let frame = Queued { with, ..in_cycle(cob_id.can_id(), config.map.bytes() as u8) };
                 drafts.push(draft(Purpose::Pdo(config.pdo), Some(node.node), frame));
             }
@@ -375,7 +376,7 @@ fn of_node(
         if config.pdo.direction == Direction::Rpdo || !is_sent(config, *cob_id) {
             continue;
         }
-        let mut frame = queued(cob_id.can_id(), config.map.bytes() as u8, settings.cycle);
+        let mut frame = queued(cob_id.can_id(), config.bytes() as u8, settings.cycle);
         match config.transmission {
             TransmissionType::SYNC_RTR | TransmissionType::EVENT_RTR => {
                 remarks.push(Remark::OnRequest(id, config.pdo));
@@ -434,7 +435,7 @@ fn answer(by: usize, span: devices::Span) -> Trigger {
 }
 
 fn is_sent(config: &PdoConfig, cob_id: CobId) -> bool {
-    cob_id.is_valid() && !config.map.0.is_empty()
+    cob_id.is_valid() && !config.is_empty()
 }
 
 /// In a queue SYNC and the RPDOs follow each other, and any of the others may stand before them, and before each other.
