@@ -104,8 +104,8 @@ export function tunePanel(shared, report) {
     if (offered !== key) return;
     if (answer.ok) {
       form = answer.result;
-      // The speed that is usual for the model, until another is typed.
-      if (form.finds === "gains" && inputs.gains.speed_rpm.input.value.trim() === "") inputs.gains.speed_rpm.input.value = String(form.usual_rpm);
+      // That of another model may be far too fast.
+      if (form.finds === "gains") inputs.gains.speed_rpm.input.value = String(form.usual_rpm);
       setText(about, form.finds === "gains" ? "The drive is measured, a twin of it is made, and gains for one wish are tried on the twin. Then the drive can try them." : "A stepper without an encoder has no gains, and shows no lost step. Ramps and currents are computed from its load and tried on its twin; nothing moves.");
     } else {
       if (["no_connection", "no_picture"].includes(answer.error.kind)) offered = null;
@@ -157,12 +157,14 @@ export function tunePanel(shared, report) {
     const { text, good } = remarkOf(result);
     say(`Node ${node}: ${text}`, !good);
     const { response, twin, drive } = result.curves;
+    // In a narrow window the letters keep their size.
+    const width = Math.max(300, Math.min(640, innerWidth - 70));
     const marks = [[result.anti_resonance_hz, "anti-resonance"], [result.resonance_hz, "resonance"]].filter(([hz]) => hz);
-    const bode = response.length ? picture(bodePanes(response), { logarithmic: true, unit: "Hz", marks, says: "Frequency response of the drive as measured, of its twin and of the model, with the coherence of the measurement" }) : null;
+    const bode = response.length ? picture(bodePanes(response), { logarithmic: true, unit: "Hz", marks, width, says: "Frequency response of the drive as measured, of its twin and of the model, with the coherence of the measurement" }) : null;
     const steps = [stepPane("A step, on the twin", twin.map(({ step }) => step)), stepPane("A load, on the twin", twin.map(({ load }) => load)), ...(drive ? [stepPane("A step, on the drive", drive)] : [])];
-    const trial = picture(steps, { logarithmic: false, unit: "ms", says: "Speed after a step and a load with the gains before and those proposed" });
+    const trial = picture(steps, { logarithmic: false, unit: "ms", width, says: "Speed after a step and a load with the gains before and those proposed" });
     had.replaceChildren(
-      h("div", { class: "columns" }, h("div", {}, bode, trial), h("div", {}, table(["Found", ""], foundRows(result)))),
+      h("div", { class: "columns" }, h("div", {}, bode, trial), h("div", {}, table(["Found", "Figure"], foundRows(result)))),
       h("h3", {}, "Proposed"),
       valueTable(result.gains),
       table(["Loop", "Crossover", "Phase margin", "Sensitivity", "State"], marginRows(result)),
@@ -190,7 +192,7 @@ export function tunePanel(shared, report) {
     const result = await asked(command, `Node ${node}: its twin turns …`);
     if (!result) return;
     say(`Node ${node}: its twin keeps in step with what is proposed. Nothing of the drive has changed.`);
-    had.replaceChildren(table(["Computed", ""], rampRows(result)), h("h3", {}, "Proposed"), valueTable(result.values), ...result.notes.map((note) => h("p", { class: "quiet" }, note)));
+    had.replaceChildren(table(["Computed", "Figure"], rampRows(result)), h("h3", {}, "Proposed"), valueTable(result.values), ...result.notes.map((note) => h("p", { class: "quiet" }, note)));
     write.hidden = false;
     setText(write, "Write them to the drive");
     write.onclick = () => writeRamps(node, result.values);

@@ -2,7 +2,7 @@
 
 import { s } from "./dom.js";
 
-const [WIDTH, LEFT, RIGHT, TOP, PANE, LOW, GAP, BELOW] = [640, 56, 12, 22, 130, 60, 26, 34];
+const [LEFT, RIGHT, TOP, PANE, LOW, GAP, BELOW] = [56, 12, 44, 130, 60, 26, 34];
 
 /** Values of a scale that are multiples of 1, 2 or 5 times a power of ten, some four of them. */
 export function ticks(low, high, many = 4) {
@@ -33,23 +33,23 @@ export function range(lines, coordinate) {
   return low === high ? [low - 1, high + 1] : [low, high];
 }
 
-/** Panes above each other with one axis below. `marks` are `[at, text]` on that axis. The picture says in words what it shows. */
-export function picture(panes, { logarithmic, unit, marks = [], says }) {
+/** Panes above each other with one axis below. `marks` are `[at, text]` on that axis. The picture says in words what it shows. `width` is that of its letters' size. */
+export function picture(panes, { logarithmic, unit, marks = [], says, width }) {
   const all = panes.flatMap((pane) => pane.lines);
   const [low, high] = range(all, 0);
   const scale = logarithmic ? Math.log10 : (value) => value;
-  const x = (value) => LEFT + ((scale(value) - scale(low)) / (scale(high) - scale(low))) * (WIDTH - LEFT - RIGHT);
+  const x = (value) => LEFT + ((scale(value) - scale(low)) / (scale(high) - scale(low))) * (width - LEFT - RIGHT);
   const parts = [];
   let top = TOP;
   for (const [at, pane] of panes.entries()) {
     const tall = pane.high === undefined ? PANE : LOW;
     const [least, most] = pane.high === undefined ? range(pane.lines, 1) : [pane.low, pane.high];
     const y = (value) => top + tall - ((value - least) / (most - least)) * tall;
-    parts.push(s("rect", { x: LEFT, y: top, width: WIDTH - LEFT - RIGHT, height: tall, class: "frame" }));
+    parts.push(s("rect", { x: LEFT, y: top, width: width - LEFT - RIGHT, height: tall, class: "frame" }));
     for (const value of ticks(least, most, tall === PANE ? 4 : 2)) {
-      parts.push(s("path", { d: `M${LEFT} ${y(value)}H${WIDTH - RIGHT}`, class: "grid" }), s("text", { x: LEFT - 6, y: y(value) + 4, "text-anchor": "end" }, String(value)));
+      parts.push(s("path", { d: `M${LEFT} ${y(value)}H${width - RIGHT}`, class: "grid" }), s("text", { x: LEFT - 6, y: y(value) + 4, "text-anchor": "end" }, String(value)));
     }
-    for (const value of logarithmic ? decades(low, high) : ticks(low, high, 6)) {
+    for (const value of logarithmic ? decades(low, high) : ticks(low, high, width < 500 ? 3 : 6)) {
       parts.push(s("path", { d: `M${x(value)} ${top}v${tall}`, class: "grid" }));
       if (at === panes.length - 1) parts.push(s("text", { x: x(value), y: top + tall + 16, "text-anchor": "middle" }, String(value)));
     }
@@ -59,14 +59,14 @@ export function picture(panes, { logarithmic, unit, marks = [], says }) {
     parts.push(s("text", { x: LEFT, y: top - 7, class: "title" }, `${pane.label}${pane.unit ? `, ${pane.unit}` : ""}`));
     if (at === 0) {
       for (const [nth, { name }] of pane.lines.entries()) {
-        const from = WIDTH - RIGHT - 92 * (pane.lines.length - nth);
-        parts.push(s("path", { d: `M${from} ${top - 11}h26`, class: `line ${name}` }), s("text", { x: from + 32, y: top - 7 }, name));
+        const from = LEFT + 84 * nth;
+        parts.push(s("path", { d: `M${from} ${top - 32}h26`, class: `line ${name}` }), s("text", { x: from + 32, y: top - 28 }, name));
       }
       for (const [where, text] of marks) parts.push(s("text", { x: x(where) + 4, y: top + tall - 6, class: "mark" }, text));
     }
     top += tall + GAP;
   }
   const height = top - GAP + BELOW;
-  parts.push(s("text", { x: WIDTH - RIGHT, y: height - 3, "text-anchor": "end" }, unit));
-  return s("svg", { viewBox: `0 0 ${WIDTH} ${height}`, class: "tune-picture", role: "img", "aria-label": says }, ...parts);
+  parts.push(s("text", { x: width - RIGHT, y: height - 3, "text-anchor": "end" }, unit));
+  return s("svg", { viewBox: `0 0 ${width} ${height}`, class: "tune-picture", role: "img", "aria-label": says }, ...parts);
 }
