@@ -165,7 +165,7 @@ export function tunePanel(shared, report) {
     const trial = picture(steps, { logarithmic: false, unit: "ms", width, says: "Speed after a step and a load with the gains before and those proposed" });
     had.replaceChildren(
       h("div", { class: "columns" }, h("div", {}, bode, trial), h("div", {}, table(["Found", "Figure"], foundRows(result)))),
-      h("h3", {}, "Proposed"),
+      h("h2", { class: "small" }, "Proposed"),
       valueTable(result.gains),
       table(["Loop", "Crossover", "Phase margin", "Sensitivity", "State"], marginRows(result)),
       ...result.notes.map((note) => h("p", { class: "quiet" }, note)),
@@ -192,7 +192,7 @@ export function tunePanel(shared, report) {
     const result = await asked(command, `Node ${node}: its twin turns …`);
     if (!result) return;
     say(`Node ${node}: its twin keeps in step with what is proposed. Nothing of the drive has changed.`);
-    had.replaceChildren(table(["Computed", "Figure"], rampRows(result)), h("h3", {}, "Proposed"), valueTable(result.values), ...result.notes.map((note) => h("p", { class: "quiet" }, note)));
+    had.replaceChildren(table(["Computed", "Figure"], rampRows(result)), h("h2", { class: "small" }, "Proposed"), valueTable(result.values), ...result.notes.map((note) => h("p", { class: "quiet" }, note)));
     write.hidden = false;
     setText(write, "Write them to the drive");
     write.onclick = () => writeRamps(node, result.values);
