@@ -10,7 +10,7 @@ export const FIELDS = {
     speed_rpm: { label: "Speed at most", unit: "r/min", usual: "", limit: true, title: "Of the motor's shaft, before a reducer" },
     current_a: { label: "Current at most", unit: "A", usual: "15", limit: true, title: "More that the speed loop asks for stops it" },
     travel_turns: { label: "Travel at most", unit: "turns", usual: "40", limit: true, title: "Of the motor's shaft, to either side of where it stands: beyond it is stopped" },
-    period_ms: { label: "Readings every", unit: "ms", usual: "2", limit: true, title: "The period of SYNC: 1 ms shows more, on a bus and a computer that keep up" },
+    period_ms: { label: "Readings every", unit: "ms", usual: "5", limit: true, title: "The period of SYNC: 1 ms shows more, on a bus and a computer that keep up; 10 ms at most" },
     torque_constant_nm_a: { label: "Torque constant", unit: "N·m/A", usual: "", optional: true, limit: true, title: "Empty: that of the model's own motor" },
   },
   ramps: {

@@ -11,7 +11,7 @@ const gains = (wish, more = {}) => orderOf(4, { finds: "gains", wish, position: 
 
 test("an order has one objective, and the limits in the units of their names", () => {
   assert.deepEqual(gains("margin", { phase_margin_deg: "50", bandwidth_hz: "fast" }), {
-    do: "tune", node: 4, phase_margin_deg: 50, bandwidth_hz: null, speed_rpm: 120, current_a: 15, travel_turns: 40, period_ms: 2, torque_constant_nm_a: null, position: false,
+    do: "tune", node: 4, phase_margin_deg: 50, bandwidth_hz: null, speed_rpm: 120, current_a: 15, travel_turns: 40, period_ms: 5, torque_constant_nm_a: null, position: false,
   });
   const { phase_margin_deg, bandwidth_hz } = gains("bandwidth", { bandwidth_hz: "12.5", phase_margin_deg: "" });
   assert.deepEqual([phase_margin_deg, bandwidth_hz], [40, 12.5]);

@@ -28,7 +28,7 @@ const TUNING: &str = "tuning";
 impl Host {
     /// Executes a command about gains or ramps, or starts it.
     pub(crate) fn take_tune(&mut self, node: NodeId, command: TuneCommand, asked: Asked) {
-        // The mathematics alone would be more than a tenth of such a page.
+        // The mathematics and what draws are not part of the module of such a page.
         if cfg!(target_arch = "wasm32") {
             let text = "a page without a server finds no gains: `ferrodrive studio` and `ferrodrive tune` do";
             return refuse(asked, ("not_here", text.to_owned()));
