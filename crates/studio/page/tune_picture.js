@@ -62,7 +62,11 @@ export function picture(panes, { logarithmic, unit, marks = [], says, width }) {
         const from = LEFT + 84 * nth;
         parts.push(s("path", { d: `M${from} ${top - 32}h26`, class: `line ${name}` }), s("text", { x: from + 32, y: top - 28 }, name));
       }
-      for (const [where, text] of marks) parts.push(s("text", { x: x(where) + 4, y: top + tall - 6, class: "mark" }, text));
+      // One above the other, towards the middle.
+      for (const [nth, [where, text]] of marks.entries()) {
+        const is_right = x(where) > width / 2;
+        parts.push(s("text", { x: x(where) + (is_right ? -4 : 4), y: top + tall - 6 - 14 * nth, "text-anchor": is_right ? "end" : "start", class: "mark" }, text));
+      }
     }
     top += tall + GAP;
   }
