@@ -275,6 +275,7 @@ mod tests {
         let at = |line: &str| read(line).pop().unwrap().unwrap().at.unwrap();
         assert_eq!(at("1) 1841 0001 0"), Instant::from_millis(1841));
         assert_eq!(at(";$FILEVERSION=1.1\n1) 1059.9 Rx 0300 0"), Instant::from_micros(1_059_900));
+        assert_eq!(at("1) 0.000001 0001 0"), Instant::from_nanos(1), "as many decimals as there may be");
         // Day 25569 is 1970-01-01.
         assert_eq!(
             at(";$FILEVERSION=1.1\n;$STARTTIME=25569.5\n1) 0.001 Rx 0300 0"),
@@ -290,6 +291,7 @@ mod tests {
             ("1) 1841 0001 2 00", "fewer bytes"),
             ("1) 1841 0001 1 0", "two hexadecimal digits"),
             ("1) x 0001 0", "milliseconds"),
+            ("1) 0.0000001 0001 0", "milliseconds"),
             ("1) 1841 0800 0", "beyond 07FF"),
             (";$FILEVERSION=7.0", "version"),
             (";$STARTTIME=soon", "days since"),

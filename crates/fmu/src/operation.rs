@@ -247,6 +247,8 @@ mod tests {
         assert_eq!(written(&Operation::Confirm(1)), [0x20, 0, 0, 0, 12, 0, 0, 0, 1, 0, 0, 0]);
         assert_eq!(written(&Operation::Baudrate(500_000)), [0x40, 0, 0, 0, 13, 0, 0, 0, 1, 0x20, 0xA1, 7, 0]);
         assert_eq!(written(&Operation::Status(NodeStatus::BusOff)), [0x41, 0, 0, 0, 9, 0, 0, 0, 3]);
+        assert_eq!(written(&Operation::ArbitrationLost(7)), [0x30, 0, 0, 0, 12, 0, 0, 0, 7, 0, 0, 0]);
+        assert_eq!(written(&Operation::Wakeup), [0x42, 0, 0, 0, 8, 0, 0, 0]);
     }
 
     #[test]

@@ -520,6 +520,21 @@ mod tests {
     }
 
     #[test]
+    fn an_order_holds_on_its_side_of_the_value_and_at_it_where_it_includes_it() {
+        for (order, holds) in [
+            (Order::Equal, [false, true, false]),
+            (Order::Unequal, [true, false, true]),
+            (Order::Below, [true, false, false]),
+            (Order::AtMost, [true, true, false]),
+            (Order::Above, [false, false, true]),
+            (Order::AtLeast, [false, true, true]),
+        ] {
+            let comparison = Comparison { order, value: 2.5, tolerance: 0.0 };
+            assert_eq!([2.0, 2.5, 3.0].map(|value| comparison.holds(value)), holds, "{order:?}");
+        }
+    }
+
+    #[test]
     fn words_become_conditions_and_others_are_refused_with_the_possible_forms() {
         for text in [
             "4 velocity > 50",

@@ -365,6 +365,7 @@ mod tests {
             (b"r1002\r", "100#R2"),
             (b"R000001002\r", "00000100#R2"),
             (b"t7FF0\r", "7FF#"),
+            (b"T1FFFFFFF0\r", "1FFFFFFF#"),
         ] {
             let frame: Frame = frame.parse().unwrap();
             assert_eq!(emitted(&Command::Transmit(frame)), text);

@@ -263,3 +263,29 @@ impl<'a> Spectra<'a> {
         Response { lines, averages, sample_s }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A loop of P and I that is asked for nothing holds against the back-emf: (R + s L + Kp + Ki / s) i = -K speed. At 100 rad/s the
+    /// figures below give 10j / (90 + 200j) = (2000 + 900j) / 48100.
+    #[test]
+    fn the_current_that_a_speed_drives_is_what_the_loop_lets_through() {
+        let back_emf =
+            BackEmf { constant_v_s: 0.1, resistance_ohm: 0.5, inductance_h: 1e-3, proportional: 1.5, integral: 100.0 };
+        let through = Complex::new(2000.0, 900.0) / 48_100.0;
+        assert!((back_emf.current_per_speed(100.0) - through).norm() < 1e-12);
+        let line = Line {
+            hz: 100.0 / TAU,
+            plant: Complex::new(3.0, -4.0),
+            closed: Complex::new(0.5, 0.0),
+            drive: Complex::new(0.1, 0.0),
+            coherence: 1.0,
+        };
+        let measured = Response { lines: vec![line], averages: 1, sample_s: 1e-3 };
+        // Per actual current: speed / (demand - through * speed).
+        let expected = line.plant / (1.0 - through * line.plant);
+        assert!((measured.without(&back_emf).lines[0].plant - expected).norm() < 1e-12);
+    }
+}

@@ -35,6 +35,7 @@ pub(super) mod programs {
     pub(in crate::defects) const CANOPEN: Tests = Tests::of("ferrodrive-canopen", "--lib");
     pub(in crate::defects) const CANOPEN_IT: Tests = Tests::of("ferrodrive-canopen", "it");
     pub(in crate::defects) const CIA402: Tests = Tests::of("ferrodrive-cia402", "--lib");
+    pub(in crate::defects) const MOTION: Tests = Tests::of("ferrodrive-motion", "--lib");
     pub(in crate::defects) const MOTION_IT: Tests = Tests::of("ferrodrive-motion", "it");
     pub(in crate::defects) const PLANT: Tests = Tests::of("ferrodrive-plant", "--lib");
     pub(in crate::defects) const PLANT_IT: Tests = Tests::of("ferrodrive-plant", "it");
@@ -45,6 +46,21 @@ pub(super) mod programs {
     pub(in crate::defects) const MASTER_IT: Tests = Tests::of("ferrodrive-master", "it");
     pub(in crate::defects) const EDS: Tests = Tests::of("ferrodrive-eds", "--lib");
     pub(in crate::defects) const WORDS: Tests = Tests::of("ferrodrive-words", "--lib");
+    pub(in crate::defects) const SIM_IT: Tests = Tests::of("ferrodrive-sim", "it");
+    pub(in crate::defects) const TUNE: Tests = Tests::of("ferrodrive-tune", "--lib");
+    pub(in crate::defects) const SLCAN: Tests = Tests::of("ferrodrive-slcan", "--lib");
+    pub(in crate::defects) const CANLOG: Tests = Tests::of("ferrodrive-canlog", "--lib");
+    pub(in crate::defects) const SCENARIO: Tests = Tests::of("ferrodrive-scenario", "--lib");
+    pub(in crate::defects) const SCENARIO_IT: Tests = Tests::of("ferrodrive-scenario", "it");
+    pub(in crate::defects) const MACHINE: Tests = Tests::of("ferrodrive-machine", "--lib");
+    pub(in crate::defects) const MACHINE_IT: Tests = Tests::of("ferrodrive-machine", "it");
+    pub(in crate::defects) const RECORDING: Tests = Tests::of("ferrodrive-recording", "--lib");
+    pub(in crate::defects) const FMU: Tests = Tests::of("ferrodrive-fmu", "--lib");
+    pub(in crate::defects) const FOXGLOVE: Tests = Tests::of("ferrodrive-foxglove", "--lib");
+    pub(in crate::defects) const SERVE: Tests = Tests::of("ferrodrive-serve", "--lib");
+    pub(in crate::defects) const HOST: Tests = Tests::of("ferrodrive-host", "--lib");
+    pub(in crate::defects) const CONFORM_IT: Tests = Tests::of("ferrodrive-conform", "it");
+    pub(in crate::defects) const IO: Tests = Tests { filter: "io_and_encoders", ..Tests::of("ferrodrive-tests", "it") };
     pub(in crate::defects) const TABLES: Tests = Tests { filter: "tables_of_", ..Tests::of("ferrodrive-tests", "it") };
     pub(in crate::defects) const WHEEL: Tests = Tests { filter: "zlac8030l", ..Tests::of("ferrodrive-tests", "it") };
 }

@@ -91,3 +91,20 @@ fn within_half_a_turn(difference: u16) -> i16 {
         difference as i16
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An encoder that sees a turn only cannot tell half a turn forward from half a turn back.
+    #[test]
+    fn the_shaft_has_moved_the_short_way() {
+        let (turn, half) = (COUNTS_PER_TURN as u16, COUNTS_PER_TURN as u16 / 2);
+        for (difference, moved) in
+            [(0, 0), (1, 1), (half - 1, half as i16 - 1), (half + 1, 1 - half as i16), (turn - 1, -1)]
+        {
+            assert_eq!(within_half_a_turn(difference), moved, "{difference} counts");
+            assert_eq!(within_half_a_turn(difference.wrapping_add(turn)), moved, "a turn more");
+        }
+    }
+}

@@ -356,7 +356,12 @@ mod tests {
         assert!(refusal("guarding = { time = '100ms', factor = 0 }").contains("expected a life time factor, 1 to 255"));
         assert!(refusal("guarding = { time = '70s', factor = 2 }").contains("100Ch counts whole ms"));
         assert!(refusal("guarding = { time = '1ms', factor = 2, of = 3 }").contains("has no 'of'"));
-        assert!(refusal("limits = { position = [5, 1] }").contains("is not below the upper"));
+        for empty in ["[5, 1]", "[5, 5]"] {
+            assert!(
+                refusal(&format!("limits = {{ position = {empty} }}")).contains("is not below the upper"),
+                "{empty}"
+            );
+        }
         assert!(refusal("limits = { pace = 5 }").contains("has no 'pace'"));
         assert!(refusal("start_up = { 1017 = 5 }\nheartbeat = '5ms'").contains("1017h:00 gets a value twice"));
         assert!(refusal("start_up = { 6066 = 70000 }").contains("6066h:00"));

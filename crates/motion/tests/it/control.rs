@@ -1,7 +1,7 @@
 //! The control loops against closed forms, on plants of the test's own.
 
 use motion::commutation::{Commutation, CommutationModel};
-use motion::foc::modulate;
+use motion::foc::{FeedForward, Foc, FocGains, FocInput, modulate};
 use motion::frames::{AlphaBeta, Dq, clarke, inverse_clarke, inverse_park, park};
 use motion::observer::{Observer, ObserverGains};
 use motion::pid::{Pi, PiGains};
@@ -48,6 +48,27 @@ fn a_pi_on_a_coil_follows_the_analytic_second_order_step() {
         assert!((current - expected).abs() < 5e-3, "{current} {expected} at {t}");
         let volts = pi.update(&gains, (1.0 - current) as f32, 0.0, 1000.0, dt_s);
         current = coil(current, f64::from(volts), r, l, f64::from(dt_s));
+    }
+}
+
+/// At its set-point a current loop asks for the voltages of the motion alone: -w L_q i_q, and w (L_d i_d + psi).
+#[test]
+fn the_feed_forward_is_the_voltage_that_a_turning_motor_induces() {
+    let motor = FeedForward { inductance_d_h: 0.4e-3, inductance_q_h: 0.7e-3, flux_linkage_wb: 6e-3 };
+    let winding = PiGains::for_winding(500.0, 0.3, 0.7e-3);
+    let gains =
+        FocGains { d: winding, q: winding, feed_forward: Some(motor), modulation_limit: 1.0, voltage_delay_s: 0.0 };
+    for (electrical_rad_s, current_a) in [(1000.0, Dq { d: -2.0, q: 5.0 }), (-300.0, Dq { d: 0.0, q: -4.0 })] {
+        let (sin, cos) = motion::angle::sin_cos_turns(0.2);
+        let phase_current_a = inverse_clarke(inverse_park(current_a, sin, cos));
+        let input = FocInput { phase_current_a, electrical_turns: 0.2, electrical_rad_s, bus_v: 100.0 };
+        let wanted = Foc::default().tick(&gains, current_a, &input, DT_S).wanted_v;
+        let expected =
+            Dq { d: -electrical_rad_s * 0.7e-3 * current_a.q, q: electrical_rad_s * (0.4e-3 * current_a.d + 6e-3) };
+        assert!(
+            (wanted.d - expected.d).abs() < 1e-3 && (wanted.q - expected.q).abs() < 1e-3,
+            "{wanted:?} {expected:?}"
+        );
     }
 }
 

@@ -47,6 +47,16 @@ fn a_move_of_all_seven_stretches_takes_d_over_v_and_v_over_a_and_a_over_j() {
 }
 
 #[test]
+fn a_move_speeds_up_and_slows_down_by_rates_of_their_own() {
+    let down = JerkRamp { rate: 50.0, ..RAMP };
+    let profile = PositionMove { down, ..rest_to_rest(100.0) }.plan();
+    // v / a + a / j each, half of the speed on the average: 0.6 s and 15, 1.05 s and 26.25; the other 58.75 at 50 a second.
+    assert!(near(profile.duration(), 0.6 + 58.75 / 50.0 + 1.05), "{}", profile.duration());
+    let half_of_the_speed = [0.3, profile.duration() - 0.525].map(|time_s| profile.at(time_s).velocity);
+    assert!(half_of_the_speed.iter().all(|velocity| near(*velocity, 25.0)), "{half_of_the_speed:?}");
+}
+
+#[test]
 fn a_move_too_short_for_rate_and_speed_takes_four_times_the_cube_root() {
     // Four equal stretches: d = 2 j t^3, where the peak acceleration j t stays below the rate.
     let profile = rest_to_rest(0.25).plan();

@@ -115,6 +115,21 @@ fn a_move_begun_too_fast_to_stop_runs_past_and_comes_back() {
 }
 
 #[test]
+fn a_move_begun_faster_than_its_plateau_slows_down_to_it_and_ends_from_the_end_speed() {
+    for distance in [1000.0_f64, -1000.0] {
+        // 400 1/s^2: to 200 in 0.5 s, from 200 to 100 in 0.25 s; (400^2 - 100^2) / 800 = 187.5 on both, the rest at 200.
+        let velocity = 400_f64.copysign(distance);
+        let s = both(distance, velocity, 0.0, 200.0, 100.0, 0.5, 0.25)[0];
+        let t = both(distance, velocity, 0.0, 200.0, 100.0, 0.5, 0.5)[1];
+        for profile in [s, t] {
+            assert!(near(profile.duration(), 0.5 + 812.5 / 200.0 + 0.25, 1e-12), "{}", profile.duration());
+            let before_the_end = profile.at(profile.duration() - 1e-9);
+            assert!(near(before_the_end.velocity.abs(), 100.0, 1e-4) && near(before_the_end.position, distance, 1e-6));
+        }
+    }
+}
+
+#[test]
 fn no_distance_from_rest_takes_no_time() {
     for profile in both(0.0, 0.0, 10.0, 1000.0, 10.0, 0.5, 0.5) {
         assert_eq!((profile.duration(), profile.at(0.0)), (0.0, Point::default()));

@@ -311,6 +311,15 @@ mod tests {
         assert!(forth.figures["figure"].kept.len() <= MOST_KEPT);
     }
 
+    #[test]
+    fn of_equal_values_the_first_run_is_named_whichever_ends_first() {
+        for numbers in [[3, 8], [8, 3]] {
+            let mut figure = Figure::new(2.0, numbers[0]);
+            numbers.iter().for_each(|number| figure.add(2.0, *number));
+            assert_eq!((figure.min, figure.max), ((2.0, 3), (2.0, 3)));
+        }
+    }
+
     /// Of a sweep of 11 values of one parameter with 2 of another, and 3 seeds, every run above 0.6 fails.
     #[test]
     fn each_value_has_its_runs_counted_and_its_first_failure_listed_before_a_second_of_another() {

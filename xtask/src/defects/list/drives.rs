@@ -1,7 +1,9 @@
 //! Motion, physics, firmware and the world around them.
 
 use crate::defects::defect::Defect;
-use crate::defects::defect::programs::{DRIVES, DRIVES_IT, MOTION_IT, PLANT, PLANT_IT, SIM, WHEEL};
+use crate::defects::defect::programs::{
+    DRIVES, DRIVES_IT, IO, MOTION, MOTION_IT, PLANT, PLANT_IT, SIM, SIM_IT, TUNE, WHEEL,
+};
 
 pub(super) const DEFECTS: &[Defect] = &[
     Defect {
@@ -129,5 +131,95 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "StopRamp::QuickStop => Braking::Ramp(parameters.quick_stop_ramp),",
         instead: "StopRamp::QuickStop => Braking::Ramp(parameters.moves.deceleration),",
         noticed_by: WHEEL,
+    },
+    Defect {
+        file: "crates/motion/src/profile.rs",
+        text: "0.5 * (start * start - end * end) * down",
+        instead: "0.5 * (start * start + end * end) * down",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/jerk.rs",
+        text: "if to.abs() > relaxed.velocity.abs() { up }",
+        instead: "if to.abs() < relaxed.velocity.abs() { up }",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/motion/src/field_weakening.rs",
+        text: "        -gains.most_a * self.depth",
+        instead: "        gains.most_a * self.depth",
+        noticed_by: MOTION,
+    },
+    Defect {
+        file: "crates/motion/src/foc.rs",
+        text: "current_a.d + self.flux_linkage_wb)",
+        instead: "current_a.d - self.flux_linkage_wb)",
+        noticed_by: MOTION_IT,
+    },
+    Defect {
+        file: "crates/plant/src/cogging.rs",
+        text: "        -self.amplitude_nm * self.phase",
+        instead: "        self.amplitude_nm * self.phase",
+        noticed_by: PLANT,
+    },
+    Defect {
+        file: "crates/plant/src/current_loop.rs",
+        text: "- omega * inductance_q_h * current_a.q,",
+        instead: "+ omega * inductance_q_h * current_a.q,",
+        noticed_by: PLANT_IT,
+    },
+    Defect {
+        file: "crates/plant/src/gear.rs",
+        text: "known_nm + 0.5 * coupling * rate_after;",
+        instead: "known_nm - 0.5 * coupling * rate_after;",
+        noticed_by: PLANT_IT,
+    },
+    Defect {
+        file: "crates/drives/src/mjoint/encoder.rs",
+        text: "if difference >= COUNTS_PER_TURN as u16 / 2",
+        instead: "if difference >= COUNTS_PER_TURN as u16 / 4",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/drives/src/node/io.rs",
+        text: "bit(1, now < of(LOWER_LIMIT))",
+        instead: "bit(1, now <= of(LOWER_LIMIT))",
+        noticed_by: IO,
+    },
+    Defect {
+        file: "crates/drives/src/engine/cia402/set_points.rs",
+        text: "if !new_set_point && self.waiting.is_none()",
+        instead: "if !new_set_point",
+        noticed_by: DRIVES,
+    },
+    Defect {
+        file: "crates/sim/src/stimulus/range.rs",
+        text: "self.high.is_none_or(|high| position <= high)",
+        instead: "self.high.is_none_or(|high| position < high)",
+        noticed_by: SIM,
+    },
+    Defect {
+        file: "crates/sim/src/world/watch.rs",
+        text: "if first && before.generation != after.generation",
+        instead: "if before.generation != after.generation",
+        noticed_by: SIM_IT,
+    },
+    Defect {
+        file: "crates/tune/src/friction.rs",
+        text: "right[i] += term * run.current_a;",
+        instead: "right[i] -= term * run.current_a;",
+        noticed_by: TUNE,
+    },
+    Defect {
+        file: "crates/tune/src/least_squares.rs",
+        text: "*value -= share * above;",
+        instead: "*value += share * above;",
+        noticed_by: TUNE,
+    },
+    Defect {
+        file: "crates/tune/src/response.rs",
+        text: "+ (self.resistance_ohm + self.proportional) * s + self.integral",
+        instead: "+ self.resistance_ohm * s + self.integral",
+        noticed_by: TUNE,
     },
 ];

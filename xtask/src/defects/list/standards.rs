@@ -209,4 +209,22 @@ pub(super) const DEFECTS: &[Defect] = &[
         instead: ".range(1, 1000).default(60)",
         noticed_by: TABLES,
     },
+    Defect {
+        file: "crates/canopen/src/lss/server.rs",
+        text: "Bound::HighestRevision => self.number(Part::RevisionNumber) <= number",
+        instead: "Bound::HighestRevision => self.number(Part::RevisionNumber) < number",
+        noticed_by: CANOPEN,
+    },
+    Defect {
+        file: "crates/eds/src/read/compact.rs",
+        text: "filter(|sub_index| *sub_index > 0);",
+        instead: "filter(|_| true);",
+        noticed_by: EDS,
+    },
+    Defect {
+        file: "crates/eds/src/read/objects.rs",
+        text: "&& is_above(&variable.low, &variable.high)",
+        instead: "&& is_above(&variable.high, &variable.low)",
+        noticed_by: EDS,
+    },
 ];
