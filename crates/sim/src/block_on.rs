@@ -138,13 +138,14 @@ mod tests {
     fn a_world_beside_gives_way_after_each_slice_and_moves_as_one_that_is_waited_for() {
         let mut world = World::new(Bitrate::M1, 1);
         let mut polls = 0;
-        let mut passing = pin!(pass_beside(&mut world, Duration::from_millis(95)));
-        let mut task = Task::new(passing.as_mut());
-        while let Some(Poll::Pending) = task.poll_if_woken() {
-            polls += 1;
+        {
+            let mut passing = pin!(pass_beside(&mut world, Duration::from_millis(95)));
+            let mut task = Task::new(passing.as_mut());
+            while let Some(Poll::Pending) = task.poll_if_woken() {
+                polls += 1;
+            }
         }
         assert_eq!(polls, 10, "ten slices, of which the last is half a one");
-        drop(task);
         assert_eq!(world.now(), Instant::from_millis(95));
         // Nothing can wake it, and nothing happens in this world.
         let stalled = block_on(&mut World::new(Bitrate::M1, 1), run_beside(&mut world, std::future::pending::<()>()));

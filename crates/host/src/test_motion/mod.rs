@@ -39,7 +39,7 @@ pub async fn follow(group: &mut Group, points: &[f64]) -> Result<Followed, Group
     let from = group.points().first().map_or(0.0, |point| point.position_turns);
     // At the end twice the same point: velocity and acceleration are zero then, and there is nothing left to be brought to rest.
     let at_rest = points.last().into_iter().cycle().take(2);
-    let path = points.iter().chain(at_rest).map(|point| [Turns(from + point)]);
+    let path: Vec<_> = points.iter().chain(at_rest).map(|point| [Turns(from + point)]).collect();
     let began = network.now();
     let (mut most, mut squares, mut cycles) = (0.0_f64, 0.0, 0_u32);
     stream(group, path, |group| {
