@@ -1,4 +1,4 @@
-"""Writes path.csv: three joint angles in degrees, a row for each 10 ms, from rest to rest."""
+"""Writes path.csv for `ferrodrive group follow`: three joint angles in degrees, a row for each 10 ms, from rest to rest."""
 
 import math
 
@@ -13,8 +13,10 @@ def share(time_s):
 
 
 with open("path.csv", "w", encoding="ascii", newline="\n") as file:
-    file.write("joint1_deg,joint2_deg,joint3_deg\n")
-    for row in range(1, round(TIME_S / PERIOD_S) + 1):
-        angle = math.tau * share(row * PERIOD_S)
+    file.write("t_s,1.angle_deg,2.angle_deg,3.angle_deg\n")
+    for row in range(round(TIME_S / PERIOD_S) + 1):
+        time_s = row * PERIOD_S
+        angle = math.tau * share(time_s)
         joints = 30 * math.sin(angle), 15 * math.sin(2 * angle), 20 * (1 - math.cos(angle)) / 2
-        file.write(",".join(f"{value:.5f}" for value in joints) + "\n")
+        # Not -0.0.
+        file.write(",".join([f"{time_s:.2f}", *(f"{round(value, 5) + 0.0:.5f}" for value in joints)]) + "\n")

@@ -293,6 +293,7 @@ fn the_page_lists_every_kind_of_the_code_and_no_other() {
         "sim/src/command",
         "host/src/capture",
         "host/src/control",
+        "host/src/group_follow",
         "host/src/network",
         "host/src/test_motion",
         "host/src/tune",

@@ -40,7 +40,7 @@ const PROGRESS_PERIOD: Duration = Duration::from_millis(200);
 #[command(after_help = "Examples:\n  \
     ferrodrive group move 1=90deg 4=0.5turn --within 3s           # default limits\n  \
     ferrodrive group move examples/machine.toml 1=90deg 2=-45deg  # its [[group]]\n  \
-    ferrodrive --bus can0 group move machine.toml --relative 1=10deg 2=10deg --hold\n  \
+    ferrodrive --bus can0 group move machine.toml --relative 1=10deg --hold\n  \
     ferrodrive --bus can0 group follow machine.toml path.csv --approach")]
 pub(crate) struct GroupCommand {
     #[command(subcommand)]
