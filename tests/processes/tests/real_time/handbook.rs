@@ -94,7 +94,7 @@ const FOLLOWED: [(&str, usize); 17] = [
     ("plan-a-bus.md", 2),
     ("why-it-does-not-move.md", 3),
     ("start-up.md", 2),
-    ("several-axes.md", 4),
+    ("several-axes.md", 6),
     ("foxglove.md", 1),
 ];
 
