@@ -58,7 +58,6 @@ pub(super) mod programs {
     pub(in crate::defects) const FMU: Tests = Tests::of("ferrodrive-fmu", "--lib");
     pub(in crate::defects) const FOXGLOVE: Tests = Tests::of("ferrodrive-foxglove", "--lib");
     pub(in crate::defects) const SERVE: Tests = Tests::of("ferrodrive-serve", "--lib");
-    pub(in crate::defects) const HOST: Tests = Tests::of("ferrodrive-host", "--lib");
     pub(in crate::defects) const CONFORM_IT: Tests = Tests::of("ferrodrive-conform", "it");
     pub(in crate::defects) const IO: Tests = Tests { filter: "io_and_encoders", ..Tests::of("ferrodrive-tests", "it") };
     pub(in crate::defects) const TABLES: Tests = Tests { filter: "tables_of_", ..Tests::of("ferrodrive-tests", "it") };

@@ -222,4 +222,10 @@ pub(super) const DEFECTS: &[Defect] = &[
         instead: "+ self.resistance_ohm * s + self.integral",
         noticed_by: TUNE,
     },
+    Defect {
+        file: "crates/motion/src/foc.rs",
+        text: "d: -electrical_rad_s * self.inductance_q_h * current_a.q,",
+        instead: "d: electrical_rad_s * self.inductance_q_h * current_a.q,",
+        noticed_by: MOTION_IT,
+    },
 ];

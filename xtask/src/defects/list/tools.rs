@@ -2,8 +2,8 @@
 
 use crate::defects::defect::Defect;
 use crate::defects::defect::programs::{
-    CANLOG, CONFORM_IT, FMU, FOXGLOVE, HOST, MACHINE, MACHINE_IT, MASTER, MASTER_IT, RECORDING, SCENARIO, SCENARIO_IT,
-    SERVE, SLCAN, WORDS,
+    CANLOG, CONFORM_IT, FMU, FOXGLOVE, MACHINE, MACHINE_IT, MASTER, MASTER_IT, RECORDING, SCENARIO, SCENARIO_IT, SERVE,
+    SLCAN, WORDS,
 };
 
 pub(super) const DEFECTS: &[Defect] = &[
@@ -128,28 +128,10 @@ pub(super) const DEFECTS: &[Defect] = &[
         noticed_by: SERVE,
     },
     Defect {
-        file: "crates/master/src/analysis/explain/communication.rs",
-        text: "if heard == 0 && listened >= 2 * period",
-        instead: "if heard == 0 && listened >= period",
-        noticed_by: MASTER_IT,
-    },
-    Defect {
         file: "crates/master/src/core/frame_log.rs",
         text: "if log.frames.len() >= log.capacity",
         instead: "if log.frames.len() > log.capacity",
-        noticed_by: MASTER_IT,
-    },
-    Defect {
-        file: "crates/master/src/pdo/silence.rs",
-        text: "filter(|time| *time >= LONG)",
-        instead: "filter(|time| *time > LONG)",
-        noticed_by: MASTER_IT,
-    },
-    Defect {
-        file: "crates/host/src/trace/ring.rs",
-        text: "until.nanos_since(passed.at) < SECOND",
-        instead: "until.nanos_since(passed.at) <= SECOND",
-        noticed_by: HOST,
+        noticed_by: MASTER,
     },
     Defect {
         file: "crates/conform/src/cases/pdo.rs",
@@ -162,5 +144,17 @@ pub(super) const DEFECTS: &[Defect] = &[
         text: "speed.abs() < self.gear.at_output(STANDSTILL_RPM)",
         instead: "speed.abs() < STANDSTILL_RPM",
         noticed_by: MASTER_IT,
+    },
+    Defect {
+        file: "crates/fmu/src/operation.rs",
+        text: "const WAKEUP: u32 = 0x42;",
+        instead: "const WAKEUP: u32 = 0x43;",
+        noticed_by: FMU,
+    },
+    Defect {
+        file: "crates/scenario/src/condition.rs",
+        text: "Order::Above => value > self.value,",
+        instead: "Order::Above => value >= self.value,",
+        noticed_by: SCENARIO,
     },
 ];
