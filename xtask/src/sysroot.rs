@@ -175,6 +175,10 @@ impl Made {
             files.filter_map(|entry| Some(entry.ok()?.path())).find(is_package).ok_or("apt-get downloaded nothing")?;
         quietly(Command::new("dpkg-deb").arg("--extract").arg(&file).arg(&unpacked))?;
         let _ = std::fs::remove_file(&file);
+        // Most of it is the compiler and what that is built with.
+        for other in ["compiler", "src"] {
+            let _ = std::fs::remove_dir_all(library.with_file_name(other));
+        }
         if library.is_dir() { Ok(library) } else { Err(format!("{package} has other folders than expected")) }
     }
 }

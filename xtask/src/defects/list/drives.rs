@@ -200,8 +200,8 @@ pub(super) const DEFECTS: &[Defect] = &[
     },
     Defect {
         file: "crates/sim/src/world/watch.rs",
-        text: "if first && before.generation != after.generation",
-        instead: "if before.generation != after.generation",
+        text: "if before.error_code != after.error_code {",
+        instead: "if before.error_code < after.error_code {",
         noticed_by: SIM_IT,
     },
     Defect {
