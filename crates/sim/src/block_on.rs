@@ -4,7 +4,7 @@
 
 use core::time::Duration;
 use std::future::poll_fn;
-use std::pin::pin;
+use std::pin::{Pin, pin};
 use std::task::Poll;
 
 use can::Instant;
@@ -59,22 +59,34 @@ fn block_on_until<F: Future>(world: &mut World, end: Instant, future: F) -> Resu
     let mut task = Task::new(future);
     world.refresh();
     loop {
-        if let Some(polled) = task.poll_if_woken() {
-            world.refresh();
-            match polled {
-                Poll::Ready(output) => return Ok(output),
-                Poll::Pending => continue,
-            }
+        if let Some(output) = turn(world, &mut task, end)? {
+            return Ok(output);
         }
-        match world.next_event() {
-            Some(at) if at <= end => world.step(),
-            Some(_) => {
-                world.run_until(end);
-                return Err(BlockOnError::OutOfTime { at: end });
-            }
-            None => return Err(BlockOnError::Stalled { at: world.now() }),
-        };
     }
+}
+
+/// Polls the future if it was woken, else moves the world on by its next event; the output once there is one.
+fn turn<F: Future>(
+    world: &mut World,
+    task: &mut Task<Pin<&mut F>>,
+    end: Instant,
+) -> Result<Option<F::Output>, BlockOnError> {
+    if let Some(polled) = task.poll_if_woken() {
+        world.refresh();
+        return Ok(match polled {
+            Poll::Ready(output) => Some(output),
+            Poll::Pending => None,
+        });
+    }
+    match world.next_event() {
+        Some(at) if at <= end => world.step(),
+        Some(_) => {
+            world.run_until(end);
+            return Err(BlockOnError::OutOfTime { at: end });
+        }
+        None => return Err(BlockOnError::Stalled { at: world.now() }),
+    };
+    Ok(None)
 }
 
 /// As [`block_on`], and gives way to what else runs on the same thread after each 10 ms of virtual time: a world that is computed
@@ -88,17 +100,9 @@ pub async fn run_beside<F: Future>(world: &mut World, future: F) -> Result<F::Ou
     let mut gave_way = world.now();
     world.refresh();
     loop {
-        if let Some(polled) = task.poll_if_woken() {
-            world.refresh();
-            match polled {
-                Poll::Ready(output) => return Ok(output),
-                Poll::Pending => continue,
-            }
+        if let Some(output) = turn(world, &mut task, Instant::FAR_FUTURE)? {
+            return Ok(output);
         }
-        if world.next_event().is_none() {
-            return Err(BlockOnError::Stalled { at: world.now() });
-        }
-        world.step();
         if world.now() - gave_way >= SLICE {
             gave_way = world.now();
             give_way().await;

@@ -63,12 +63,9 @@ impl NodeCommand {
     ];
 
     pub(super) fn words() -> impl Iterator<Item = &'static str> {
-        let (parameters, others) = (
-            [ParameterReading::WORDS, ParameterChange::WORDS],
-            [PdoCommand::WORDS, CaptureCommand::WORDS, TuneCommand::WORDS],
-        );
-        let of_kinds = parameters.into_iter().chain(others);
-        of_kinds.chain([Self::WORDS]).flatten().copied()
+        let of_parameters = [ParameterReading::WORDS, ParameterChange::WORDS];
+        let others = [PdoCommand::WORDS, CaptureCommand::WORDS, TuneCommand::WORDS, Self::WORDS];
+        of_parameters.into_iter().chain(others).flatten().copied()
     }
 
     /// Whether it needs control.
