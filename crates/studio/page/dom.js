@@ -16,6 +16,15 @@ function fill(element, properties, children) {
 /** An element with attributes; `onclick` and the like add listeners. Autocomplete is off: its list would take the keys of Stop. */
 export const h = (tag, properties = {}, ...children) => fill(document.createElement(tag), tag === "input" ? { autocomplete: "off", ...properties } : properties, children);
 
+/** A table with these heads. A row is its cells, or `{ cells, kind }` with a class; in a narrow window each cell shows its head. */
+export const table = (heads, rows) =>
+  h(
+    "table",
+    {},
+    h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", { scope: "col" }, head)))),
+    h("tbody", {}, ...rows.map((row) => (Array.isArray(row) ? { cells: row, kind: "" } : row)).map(({ cells, kind }) => h("tr", { class: kind ?? "" }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell))))),
+  );
+
 /** A toggle button with `checked`: pressed by the pointer and by Enter, since Space is Stop. `id` may be null. */
 export function toggle(id, text, on, onchange = () => {}, properties = {}) {
   const button = h("button", { type: "button", id, class: "toggle", "aria-pressed": String(on), ...properties }, text);

@@ -1,21 +1,13 @@
 // Parameter files in the Parameters view: backup, three-way comparison, and applying a file after its dry run.
 
 import { ask, inControl } from "./link.js";
-import { count, h, setText } from "./dom.js";
+import { count, h, setText, table } from "./dom.js";
 import { request } from "./transport.js";
 
 /** A message may have 64 KiB, and a character of the file may take two bytes of it. */
 const LARGEST = 30000;
 /** The largest file that is read, in bytes. */
 const LARGEST_FILE = 2 ** 20;
-
-const table = (heads, rows) =>
-  h(
-    "table",
-    {},
-    h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))),
-    h("tbody", {}, ...rows.map(({ cells, kind }) => h("tr", { class: kind ?? "" }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell))))),
-  );
 
 /** `node` gives the chosen drive; `mark` takes the values of a file; `written` is called after a write. */
 export function parameterFile({ node, report, mark, written }) {

@@ -1,18 +1,10 @@
 // What a change of PDOs would write, in order, and its effect on the bus: requested from the studio a moment after each change.
 
 import { ask } from "./link.js";
-import { count, h, number, setText } from "./dom.js";
+import { count, h, number, setText, table } from "./dom.js";
 
 /** Time without a change before the request. */
 const SETTLED_MS = 300;
-
-const table = (heads, rows) =>
-  h(
-    "table",
-    {},
-    h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", { scope: "col" }, head)))),
-    h("tbody", {}, ...rows.map(({ cells, kind }) => h("tr", { class: kind ?? "" }, ...cells.map((cell, at) => h("td", { "data-label": heads[at] }, cell))))),
-  );
 
 /** `write` applies the plan, `forget` discards it. */
 export function pdoPlan({ write, forget }) {

@@ -2,7 +2,7 @@
 
 import { captures } from "./capture_store.js";
 import { choice } from "./choice.js";
-import { h, setText } from "./dom.js";
+import { h, setText, table } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
@@ -100,9 +100,8 @@ export function testMotionPanel(shared, report, { taken, open }) {
     const made = capturesOf(result);
     const left = made.length > MOST_KEPT ? ` The first ${MOST_KEPT} runs are kept as captures.` : "";
     say(`Node ${node}: ${remarkOf(result)}${left}`, result.lacks.length > 0);
-    const rows = figureRows(result).map((row) => h("tr", {}, ...row.map((text, at) => h("td", { "data-label": HEAD[at] }, text))));
     const shows = made.map((capture) => h("button", { type: "button", onclick: () => open(capture) }, `Show ${capture.name}`));
-    had.replaceChildren(h("table", {}, h("thead", {}, h("tr", {}, ...HEAD.map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, ...rows)), h("div", { class: "bar" }, ...shows));
+    had.replaceChildren(table(HEAD, figureRows(result)), h("div", { class: "bar" }, ...shows));
     taken(made);
   }
 

@@ -1,7 +1,7 @@
 // The wizard for gains and ramps in the Scope view: measured, modelled, proposed, tried on the twin; and then on the drive, if that is wanted.
 
 import { choice } from "./choice.js";
-import { h, setText, toggle } from "./dom.js";
+import { h, setText, table, toggle } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
@@ -11,8 +11,6 @@ import { picture } from "./tune_picture.js";
 const SETTINGS = "tune";
 const DOING = "tuning";
 
-const table = (heads, rows) =>
-  h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", { scope: "col" }, head)))), h("tbody", {}, ...rows.map((row) => h("tr", {}, ...row.map((text, at) => h("td", { "data-label": heads[at] }, text))))));
 const valueTable = (values) => table(["Object", "Name", "Has", "Proposed"], values.map(({ object, name, before, after }) => [object, name, String(before), String(after)]));
 
 export function tunePanel(shared, report) {

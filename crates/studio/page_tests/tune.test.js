@@ -42,7 +42,7 @@ test("what was found is shown with its units, and what was not found as that", (
   assert.equal(rows["Twin and drive differ by"], "5 %");
   assert.equal(rows.Coherent, "at 90 of 100 frequencies");
   assert.equal(rows["Delay of the speed loop"], "1.3 ms");
-  // A joint is known by readings: of it there is no response.
+  // A joint is measured by SDO, which is too slow for a frequency response.
   const joint = Object.fromEntries(foundRows(report({ frequencies: 0, anti_resonance_hz: 12.34, resonance_hz: 20 })));
   assert.equal(joint["Anti-resonance, resonance"], "12.3 Hz, 20.0 Hz, by the data of its reducer");
   assert.ok(!("Coherent" in joint) && joint["Currents of twin and drive differ by"] === "5.2 %", JSON.stringify(joint));
