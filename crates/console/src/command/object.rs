@@ -68,6 +68,11 @@ impl ObjectReport {
         self.value.value
     }
 
+    /// Whether more was read than is shown.
+    pub fn is_cut(&self) -> bool {
+        self.value.is_cut() && !self.written && self.file.is_none()
+    }
+
     /// What was read of an object, or has been written.
     pub fn new(
         drive: &Drive,
@@ -106,8 +111,7 @@ impl ObjectReport {
             return format!("node {} {}{name}: {} {to} {file}", self.node, self.object, counted(bytes, "byte"));
         }
         let verb = if self.written { " written:" } else { " =" };
-        let cut = (self.value.is_cut() && !self.written).then(|| "-o FILE writes all of them into a file".to_owned());
-        let note = self.note.as_ref().or(cut.as_ref()).map(|note| format!("\n  note    {note}")).unwrap_or_default();
+        let note = self.note.as_ref().map(|note| format!("\n  note    {note}")).unwrap_or_default();
         format!("node {} {}{name}{verb} {}{note}", self.node, self.object, self.value.text(paint))
     }
 }

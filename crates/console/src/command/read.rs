@@ -12,15 +12,16 @@ use super::object::{ObjectReport, moving_limits, resolve};
 use crate::context::Context;
 use crate::failure::Failure;
 
+/// What an object is named by, and examples, for the help.
+pub const HELP: &str = "Objects are hexadecimal indices or names:\n  6064, 0x6064, 6064h, 2026:01, position_actual_value\n\
+    Several at once:\n  1018:*        all sub-indices\n  1600:1..4     some of them\n  1000..1FFF    every object between these indices\n\
+    Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*";
+
 /// Read objects of a node, decoded with unit and meaning
 #[derive(Debug, clap::Args)]
 // The command line has options beside, in a struct of the same name: clap has a group for each struct.
 #[group(id = "objects_of_a_node")]
-#[command(
-    after_help = "Objects are hexadecimal indices or names:\n  6064, 0x6064, 6064h, 2026:01, position_actual_value\n\
-    Several at once:\n  1018:*        all sub-indices\n  1600:1..4     some of them\n  1000..1FFF    every object between these indices\n\
-    Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*"
-)]
+#[command(after_help = HELP)]
 pub struct Read {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -42,7 +43,7 @@ impl Read {
     /// Reads, decodes and shows one after the other.
     ///
     /// # Errors
-    /// Those of `show`; those of the master; there is nothing.
+    /// What `show` fails with; the node has nothing of a selection; an error of the master.
     pub async fn run(
         &self,
         context: &Context,

@@ -39,7 +39,7 @@ impl Scan {
 /// Who is on the bus, and what others sent meanwhile.
 ///
 /// # Errors
-/// There is no node; those of the master.
+/// No node answers; an error of the master.
 pub async fn look(context: &Context) -> Result<(Vec<Found>, Vec<Heard>), Failure> {
     let asked = |count| context.show(format!("asked {count} of 127"));
     let (mut counted, mut decoder) = (Counted::default(), context.decoder());

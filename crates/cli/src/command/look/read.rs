@@ -10,14 +10,11 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report, print};
 use plot::Paint;
+use words::object::ObjectArg;
 
 /// Read objects of a node, decoded with unit and meaning
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Objects are hexadecimal indices or names:\n  6064, 0x6064, 6064h, 2026:01, position_actual_value\n\
-    Several at once:\n  1018:*        all sub-indices\n  1600:1..4     some of them\n  1000..1FFF    every object between these indices\n\
-    Examples:\n  ferrodrive read 4 6064 606C statusword\n  ferrodrive read 4 1018:*\n  ferrodrive read 5 1021 -o device.eds"
-)]
+#[command(after_help = format!("{}\n  ferrodrive read 5 1021 -o device.eds", read::HELP))]
 pub(crate) struct Read {
     #[command(flatten)]
     what: read::Read,
@@ -34,8 +31,7 @@ impl Read {
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
         let show = |report: &ObjectReport| format.print(report).map_err(Failure::of_stdout);
         let Some(path) = &self.to else { return self.what.run(context, show).await };
-        self.check_file(path, self.what.one().is_some(), format.json)?;
-        let Some(object) = self.what.one() else { return Ok(()) };
+        let object = self.checked(path, format.json)?;
         let (mut report, payload) = self.what.read_one(context, object).await?;
         if is_stdout(path) {
             // Nothing else is to be among them.
@@ -46,21 +42,22 @@ impl Read {
         show(&report)
     }
 
-    fn check_file(&self, path: &Path, is_one: bool, json: bool) -> Result<(), Failure> {
-        if !is_one {
-            return Err(Failure::usage("--output accepts one object only")
-                .next("read the objects one by one, or use --json > FILE"));
-        }
+    /// The one object whose bytes go into a file that may be made.
+    fn checked(&self, path: &Path, json: bool) -> Result<&ObjectArg, Failure> {
+        let object = self.what.one().ok_or_else(|| {
+            Failure::usage("--output accepts one object only").next("read the objects one by one, or use --json > FILE")
+        })?;
         if json && is_stdout(path) {
             return Err(Failure::usage("the bytes of an object and lines of JSON cannot both go to standard output")
                 .next("give --output FILE, or omit --json"));
         }
-        new_file(Some(path), self.force).map(drop)
+        new_file(Some(path), self.force).map(|_| object)
     }
 }
 
 impl Report for ObjectReport {
     fn text(&self, paint: Paint) -> String {
-        self.text(paint)
+        let advice = if self.is_cut() { "\n  note    -o FILE writes all of them into a file" } else { "" };
+        format!("{}{advice}", self.text(paint))
     }
 }
