@@ -2,7 +2,7 @@
 //!
 //! In: positions of each axis over time ([`RecordedPath`]), and what a move of a group takes too. Between its points the path is a
 //! cubic spline that is at rest at both ends; a set-point of it is sent in each cycle of SYNC. The group is led to the first point as by
-//! a move. `ferrodrive group follow`, a line of a scenario's host (`group follow path.csv`) and Python's `Group.follow` are this.
+//! a move. `ferrodrive group follow` and a line of a scenario's host (`group follow path.csv`) are this.
 
 mod path;
 mod spline;

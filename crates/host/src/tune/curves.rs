@@ -7,7 +7,7 @@ use super::{StepResponse, Trial};
 /// Curves of a tuning.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curves {
-    /// Speed per current demand, by ascending frequencies; empty of a drive that is known by readings.
+    /// Speed per current demand, by ascending frequencies; empty for a drive that is measured by SDO, which is too slow for it.
     pub response: Vec<ResponseRow>,
     /// The twin with the gains that the drive had, and with those proposed.
     pub twin: [Trial; 2],
