@@ -1,10 +1,9 @@
 //! Gains for the loops of a drive, for Python: the parts are those of `ferrodrive tune`.
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use host::capture::with_left;
-use host::tune::{Bounds, Objective, Request, loops_of, tune};
+use host::tune::{Bounds, Order, loops_of, tune};
 use master::cyclic::CyclicOptions;
 use pyo3::prelude::*;
 
@@ -14,9 +13,6 @@ use super::value::Value;
 use super::whole::AskedDrive;
 use super::{Job, Network, duration};
 use crate::failure::bad_value;
-
-/// Longest time for the transaction with the proposed values, as the default of the command line.
-const WITHIN: Duration = Duration::from_secs(60);
 
 /// What is asked for, in plain values.
 #[derive(FromPyObject)]
@@ -53,27 +49,22 @@ pub(crate) fn tune_drive(
     order: TuneOrder,
 ) -> PyResult<Job> {
     let asked = AskedDrive::of(network.get(), node, model)?;
-    let objective = order.bandwidth_hz.map_or(Objective::PhaseMargin(order.phase_margin_deg), Objective::Bandwidth);
-    let mut request = Request {
-        objective,
-        with_position: order.position,
-        period: duration(order.period)?,
-        bounds: Bounds {
-            speed_rpm: order.speed_rpm.unwrap_or(Bounds::default().speed_rpm).abs(),
-            current_a: order.current_a.abs(),
-            travel_turns: order.travel_turns,
-        },
-        cyclic: CyclicOptions::default(),
+    let wanted = Order {
+        bandwidth_hz: order.bandwidth_hz,
+        phase_margin_deg: order.phase_margin_deg,
+        position: order.position,
+        speed_rpm: order.speed_rpm,
+        current_a: order.current_a,
+        travel_turns: order.travel_turns,
+        period_ms: duration(order.period)?.as_secs_f64() * 1e3,
         torque_constant_nm_a: order.torque_constant_nm_a,
-        journal: asked.journal(order.journal),
-        on_kept: |_| (),
-        apply: order.apply,
-        within: WITHIN,
     };
-    request.check().map_err(|failure| bad_value(failure.what))?;
+    let request = wanted.request(Bounds::default().speed_rpm, CyclicOptions::default(), asked.journal(order.journal));
+    let mut request = request.map_err(|failure| bad_value(failure.what))?;
+    request.apply = order.apply;
     network.get().begin_leading_back(py, |way_back| async move {
         let drive = asked.drive().await?;
-        if order.speed_rpm.is_none() {
+        if wanted.speed_rpm.is_none() {
             request.bounds.speed_rpm = loops_of(&drive)?.1.usual_rpm;
         }
         let restorer = way_back.of(&drive);
