@@ -41,6 +41,8 @@ struct Node {
     lost: LostFrame,
     /// It has said that it takes no part.
     is_off: bool,
+    /// It sends the frame that ends now.
+    is_sending: bool,
     bitrate: Option<Bitrate>,
     outbox: Vec<u8>,
 }
@@ -257,6 +259,9 @@ impl BusUnit {
 
     /// Ends what is due now: who receives it, who is confirmed, who is notified of an error.
     fn deliver(&mut self) {
+        for (i, node) in self.nodes.iter_mut().enumerate() {
+            node.is_sending = self.bus.is_sending(i);
+        }
         if let Some(passed) = self.bus.advance(self.now) {
             for (i, node) in self.nodes.iter_mut().enumerate() {
                 match self.bus.conclude(i, &passed) {
@@ -269,13 +274,12 @@ impl BusUnit {
         while let Some(event) = self.bus.poll_event() {
             let WireEvent::Error { source, frame, cause, .. } = event else { continue };
             for (i, node) in self.nodes.iter_mut().enumerate().filter(|(_, node)| !node.is_off) {
-                let is_sender = i == source;
                 let error = BusError {
                     id: frame.id().raw(),
                     code: code_of(cause),
-                    // The wire does not say which receivers saw it first.
-                    is_primary: is_sender,
-                    is_sender,
+                    // The wire does not say which receivers saw it first, and one node alone has this flag.
+                    is_primary: i == source,
+                    is_sender: i == source || node.is_sending,
                 };
                 Operation::BusError(error).write(&mut node.outbox);
             }

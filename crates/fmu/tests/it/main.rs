@@ -2,6 +2,7 @@
 
 mod against_world;
 mod axis;
+mod bus;
 mod importer;
 mod joint;
 mod rules;

@@ -41,7 +41,7 @@ fn any_bytes() -> impl Strategy<Value = Vec<u8>> {
     )
 }
 
-/// 5,000 mutated buffers, each to a drive and a bus: what comes out of a drive and of a bus are whole operations, whatever comes in.
+/// 10,000 mutated buffers, each to a drive and a bus: what comes out of a drive and of a bus are whole operations, whatever comes in.
 #[test]
 fn ten_thousand_buffers_are_taken_or_answered_with_a_format_error() {
     let mut drive = instance(drive("zlac8030l@4,timing=ideal", TxClock::Triggered));
@@ -51,7 +51,7 @@ fn ten_thousand_buffers_are_taken_or_answered_with_a_format_error() {
     let mut time = 0.0;
     let mut runner = proptest::test_runner::TestRunner::deterministic();
     let strategy = any_bytes();
-    for case in 0..5_000 {
+    for case in 0..10_000 {
         let bytes = strategy.new_tree(&mut runner).unwrap().current();
         drive.set(2, Value::Binary(bytes.clone())).unwrap();
         bus.set(1001 + 5 * (case % 3), Value::Binary(bytes.clone())).unwrap();

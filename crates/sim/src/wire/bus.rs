@@ -247,6 +247,11 @@ impl Bus {
         Statistics { at: now, ..self.statistics }
     }
 
+    /// Whether controller `i` sends the frame that is on the wire; several do where they began the same identifier at once.
+    pub fn is_sending(&self, i: usize) -> bool {
+        self.controllers[i].sending.is_some()
+    }
+
     /// Error counters of controller `i`.
     pub fn counters(&self, i: usize) -> ErrorCounters {
         self.controllers[i].counters
