@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import math
 import pathlib
+import random
 import struct
 import subprocess
 import sys
@@ -16,11 +17,13 @@ import fmpy
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
-from checks import check, equal, near, true
+from checks import PATIENCE_S, check, equal, near, true
 from drive import ZLAC8030L
 
-TRANSMIT, CONFIRM, CONFIGURATION, STATUS = 0x10, 0x20, 0x40, 0x41
+FORMAT_ERROR, TRANSMIT, CONFIRM, CONFIGURATION, STATUS = 0x01, 0x10, 0x20, 0x40, 0x41
 
 
 def transmit(identifier, data):
@@ -248,7 +251,31 @@ def wrong(bench):
             refused(lambda: drive.fmu.getUInt16([drive.reference["angle"]]), "a variable of another type")
             refused(lambda: drive.fmu.setFloat64([drive.reference["load_torque"]], [math.nan]), "not a number")
             refused(lambda: drive.fmu.setFMUState(ctypes.c_void_p(99)), "a state that is not one")
+            refused(lambda: drive.fmu.setBinary([drive.reference["CAN.Tx_Data"]], [b""]), "an output that is set")
+            refused(lambda: drive.fmu.setBinary([drive.reference["load_torque"]], [bytes(8)]), "bytes for a number")
             drive.step(1e-3)
+
+
+@check("10,000 mutated buffers to a drive and to a bus are answered by format errors, and the importing process lives", ZLAC8030L)
+def mutated(bench):
+    chance = random.Random(27)
+    seeds = [download(4, 0x6040, b"\6\0"), struct.pack("<IIBI", CONFIGURATION, 13, 1, 500_000), struct.pack("<IIB", STATUS, 9, 3)]
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        words = (["zlac8030l@4,timing=ideal", "--clock", "triggered"], ["bus", "--nodes", "3", "--clock", "triggered"])
+        both = [stack.enter_context(Instance(pack(bench, folder, *each), folder)) for each in words]
+        answers = 0
+        for each, terminal in zip(both, ("CAN", "Node1")):
+            each.begin()
+            for _ in range(10_000):
+                data = bytearray(b"".join(chance.choices(seeds, k=chance.randint(1, 3))))
+                for _ in range(chance.randint(0, 4)):
+                    data[chance.randrange(len(data))] = chance.randrange(256)
+                del data[chance.randint(0, len(data)) :: chance.choice((1, len(data)))]
+                each.fmu.setBinary([each.reference[f"{terminal}.Rx_Data"]], [bytes(data)])
+                each.step(1e-4)
+                said = each.fmu.getBinary([each.reference[f"{terminal}.Tx_Data"]])[0] or b""
+                answers += sum(code == FORMAT_ERROR for code, _ in operations(said))
+        true(answers > 1000, f"{answers} format errors")
 
 
 def refused(call, what):
@@ -360,6 +387,10 @@ class Script:
     def receive(self, now, data):
         self.received += [(now, code, content) for code, content in operations(data)]
 
+    def confirmations(self):
+        """When which identifier was confirmed."""
+        return [(at, content) for at, code, content in self.received if code == CONFIRM]
+
     def frames(self):
         """What it heard as a frame: instant, identifier, data."""
         plain = ((at, *struct.unpack_from("<I", content), content[8:]) for at, code, content in self.received if code == TRANSMIT)
@@ -390,7 +421,7 @@ supply = "last 4 supply"
 """
 
 
-@check("frames, shafts and voltages of FMUs on a bus, of a scenario and of a world of Python are the same to the last bit", ZLAC8030L)
+@check("frames, shafts and voltages of FMUs on a bus, of `ferrodrive run` and of a world of Python are the same to the last bit", ZLAC8030L)
 def same_bus(bench):
     frames = [(ms * 1_000_000, identifier, bytes.fromhex(data)) for ms, identifier, data in TALK]
     end_ms = 2200
@@ -413,8 +444,7 @@ def same_bus(bench):
         network.run(end_ms * 1_000_000)
         equal(script.frames(), expected, "frames with their instants")
         true(len(expected) > 12, f"{len(expected)} frames")
-        confirmed = [content for _, code, content in script.received if code == CONFIRM]
-        equal(confirmed, [struct.pack("<I", identifier) for _, identifier, _ in frames], "confirmations of what was sent")
+        equal([content for _, content in script.confirmations()], [struct.pack("<I", identifier) for _, identifier, _ in frames], "confirmations of what was sent")
         for drive, other in zip(drives, of_python):
             got = [drive.real(name) for name in ("angle", "current", "bus_voltage")]
             equal(got, [other.shaft_angle_rad, other.current_a, other.supply_v], f"node {other.node_id}")
@@ -424,6 +454,19 @@ def same_bus(bench):
         figures = ferrodrive.run(path).figures
         equal(drives[0].real("velocity"), figures["velocity"] * math.pi / 30, "speed in a scenario")
         equal([drives[0].real(name) for name in ("current", "bus_voltage")], [figures["current"], figures["supply"]], "in a scenario")
+        sent = [(at, identifier, data) for (at, *_), (_, identifier, data) in zip(script.confirmations(), frames)]
+        whole = sorted([*expected, *sent])
+        equal(whole, [frame for frame in run_frames(bench, path) if frame[0] <= end_ms * 1_000_000], "frames of `ferrodrive run`")
+
+
+def run_frames(bench, path):
+    """All frames of a scenario as the command line records them: when their last bit ended, identifier, data."""
+    record = path.with_suffix(".mcap")
+    done = subprocess.run([bench.program, "run", str(path), "--record", str(record)], capture_output=True, text=True, timeout=PATIENCE_S)
+    equal(done.returncode, 0, f"exit status of the scenario: {done.stdout}{done.stderr}")
+    with open(record, "rb") as file:
+        messages = list(make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics=["/can"]))
+    return [(message.log_time, frame.id, bytes(frame.data[: frame.dlc])) for _, _, message, frame in messages]
 
 
 def said():
