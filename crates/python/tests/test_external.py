@@ -146,6 +146,40 @@ def test_an_array_that_asks_the_world_itself_does_not_wait_for_it():
         assert world.exchange(0.001, Angles(), [0.0, 0.0]).shape == (2,)
 
 
+@pytest.mark.parametrize("many", [False, True])
+def test_other_threads_run_while_time_passes_in_an_exchange(many):
+    """The interpreter takes its lock from no thread here that does not give it: the other runs in the middle of an exchange or never."""
+    world = wheels()
+    worlds = ferrodrive.Worlds([wheels()]) if many else None
+    gate, steps, seen, done = threading.Semaphore(0), [], [], []
+
+    def other():
+        while not done:
+            gate.acquire()
+            seen.append(len(steps))
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(3600)
+    thread = threading.Thread(target=other)
+    try:
+        thread.start()
+        for step in range(1000):
+            gate.release()
+            if worlds:
+                worlds.exchange(0.1, [[0.0, 0.0]], [[0.0, 0.0]])
+            else:
+                world.exchange(0.1, [0.0, 0.0], [0.0, 0.0])
+            if len(seen) > len(steps):
+                break
+            steps.append(step)
+        assert len(steps) < 1000
+    finally:
+        sys.setswitchinterval(interval)
+        done.append(True)
+        gate.release()
+        thread.join()
+
+
 def test_a_copy_of_a_world_adds_drives_of_its_fidelity():
     world = ferrodrive.World(fidelity="mechanical")
     copy = world.snapshot()
