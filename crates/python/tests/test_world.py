@@ -393,6 +393,7 @@ def test_every_stimulus_has_a_method():
     # A node whose objects are the outer world's needs a file; its words are enough here.
     drive._do = lambda *stimulus: said.append(_native.stimulus_words(*stimulus))
     drive.set_object(0x6000, 1, 255)
+    drive.send_mpdo(None, 0x6200, 1, 255)
     wire = Wire()
     wire.said = said
     wire.corrupt(0.01)

@@ -49,6 +49,14 @@ pub enum Refused {
         /// Why, and what it would take.
         reason: String,
     },
+    /// The node has no multiplexed PDO to send now.
+    #[error(
+        "this {model} sends no such PDO now: it has to be operational, with FFh in 1A00h:00 or another TPDO's, and the one before sent"
+    )]
+    NotSent {
+        /// The node's model.
+        model: &'static str,
+    },
     /// The value makes no sense for this machine.
     #[error("{what} must be {expected}, not {}", shown(*value))]
     OutOfRange {

@@ -24,7 +24,7 @@ mod words;
 pub use body::{BodyStimulus, GET_BODY};
 pub use bus_fault::{BusFault, WireFault};
 pub use error::StimulusError;
-pub use kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
+pub use kinds::{Component, MPDO_VALUES, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
 pub use load::{Friction, LoadKind, LoadPart};
 pub use parse::{FORMS, GET, RUN};
 pub use place::Place;

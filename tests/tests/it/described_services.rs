@@ -1,14 +1,18 @@
 //! Services of CiA 301 that a device has by the objects of its file: TIME and EMCY of others, multiplexed PDOs, the date of its
 //! configuration, and that nothing is taken that has no effect.
 
+use std::time::Duration;
+
 use can::{Bitrate, Instant, Station};
 use canopen::od::{Access, Conditions, Kind, condition_numbers};
 use canopen::time_stamp::TimeOfDay;
 use canopen::{Mux, NodeId, NodeProfile};
 use drives::communication::communication;
 use drives::node::{DescribedNode, Memory, acts_on, conditions};
+use eds::{Eds, keep};
 use ferrodrive_tests::sheet::{SheetRow, U8, U16, U32, U64, sheet};
-use sim::machine::Boxed;
+use sim::machine::{Boxed, Order, order};
+use sim::{Place, World};
 
 struct Bench {
     node: DescribedNode<Boxed>,
@@ -19,7 +23,7 @@ struct Bench {
 impl Bench {
     /// Node 9, switched on, its boot-up message taken away.
     fn new(rows: &[SheetRow]) -> Self {
-        let model = eds::keep(&eds::Eds::load(&sheet(rows)).expect("it is read").eds).expect("it is kept");
+        let model = keep(&Eds::load(&sheet(rows)).expect("it is read").eds).expect("it is kept");
         let list: &'static _ = conditions(model.dictionary).collect::<Vec<_>>().leak();
         let numbers: &'static [u16; 256] = Box::leak(Box::new(condition_numbers(list)));
         let conditions: &'static Conditions = Box::leak(Box::new(Conditions::new(list, numbers)));
@@ -262,8 +266,115 @@ fn changed_objects_of_the_scanning_list_are_sent_in_source_address_mode_in_turn(
     }
     let subs: Vec<&str> = sent.iter().map(|frame| &frame[10..12]).collect();
     assert_eq!(subs, ["01", "02", "01", "02"]);
-    assert_eq!(bench.write(0x1800, 1, 4, 0x8000_0189), None);
-    assert_eq!(bench.write(0x1A00, 0, 1, 0xFF), Some(0x0604_0042), "no application addresses others");
+}
+
+/// The rows of a TPDO1 and an RPDO1 that are multiplexed in destination address mode, an object, and no 1005h.
+fn to_destinations(rpdo: u64) -> [SheetRow; 9] {
+    [
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1400, 1, U32, "rw", rpdo, false),
+        (0x1400, 2, U8, "rw", 255, false),
+        (0x1600, 0, U8, "rw", 0xFF, false),
+        (0x1800, 1, U32, "rw", 0x4000_0189, false),
+        (0x1800, 2, U8, "rw", 254, false),
+        (0x1800, 3, U16, "rw", 20, false),
+        (0x1A00, 0, U8, "rw", 0xFF, false),
+        (0x6200, 1, U16, "rw", 0, true),
+    ]
+}
+
+/// CiA 301, 7.2.3.2.1: FFh and the consumer's node-ID with bit 7, its object, four bytes. The inhibit time is 2 ms.
+#[test]
+fn the_application_of_a_described_node_writes_to_objects_of_others() {
+    let mut bench = Bench::new(&to_destinations(0x8000_0209));
+    let (object, data) = (Mux::new(0x6200, 1), 0x1234_u32.to_le_bytes());
+    let send = |bench: &mut Bench, to| bench.node.send_to_destination(NodeId::new(to), object, data, bench.now);
+    assert!(!send(&mut bench, 7), "not before operational");
+    bench.send("000#0109");
+    assert!(send(&mut bench, 7));
+    assert_eq!(bench.drain(), ["189#8700620134120000"]);
+    assert!(send(&mut bench, 0) && !send(&mut bench, 7), "one waits");
+    assert_eq!(bench.run(1), [""; 0], "inhibit time");
+    assert_eq!(bench.run(1), ["189#8000620134120000"], "of all");
+    bench.set(0x6200, 1, &[1, 0]);
+    assert_eq!(bench.run(10), [""; 0], "by its application alone");
+    assert_eq!(bench.write(0x1800, 1, 4, 0xC000_0189), None);
+    assert_eq!(bench.write(0x1A00, 0, 1, 0), None);
+    assert_eq!(bench.write(0x1A00, 0, 1, 0xFF), None, "a host may choose it");
+    assert_eq!(bench.write(0x1800, 1, 4, 0x4000_0189), None);
+    assert!(send(&mut bench, 7));
+}
+
+#[test]
+fn in_a_world_one_described_node_writes_to_another_and_a_drive_has_no_such_application() {
+    let mut world = World::new(Bitrate::M1, 1);
+    let model = |rpdo| keep(&Eds::load(&sheet(&to_destinations(rpdo))).unwrap().eds).unwrap();
+    // They listen to what the other sends; node 9's sends as node 8's.
+    for (number, model) in [(8, model(0x0189)), (9, model(0x8000_0209)), (5, &devices::servo::CIA402)] {
+        let drive = order(model, &Order::new(model, NodeId::new(number).unwrap(), Bitrate::M1)).unwrap();
+        world.add_drive(number, drive).unwrap();
+    }
+    world.run_for(Duration::from_secs(1));
+    let apply = |world: &mut World, node, words: &str| {
+        let applied = world.apply(Place::node(node), &words.parse().unwrap()).unwrap();
+        world.run_for(Duration::from_millis(5));
+        applied.map_err(|refused| refused.to_string())
+    };
+    let host = world.add_probe();
+    let refused = apply(&mut world, 9, "mpdo 8 6200:01 4660").unwrap_err();
+    assert!(refused.contains("it has to be operational, with FFh in 1A00h:00"), "{refused}");
+    world.send(host, "000#0100".parse().unwrap()).unwrap();
+    world.run_for(Duration::from_millis(5));
+    let read = |world: &mut World| {
+        world.send(host, "608#4000620100000000".parse().unwrap()).unwrap();
+        world.run_for(Duration::from_millis(5));
+        let heard = std::iter::from_fn(|| world.poll_received(host)).map(|(_, frame)| frame.to_string());
+        heard.filter(|frame| frame.starts_with("588#")).last().unwrap()
+    };
+    for (words, value) in
+        [("mpdo 8 6200:01 4660", "3412"), ("mpdo all 6200:01 -2", "FEFF"), ("mpdo 7 6200:01 1", "FEFF")]
+    {
+        assert_eq!(apply(&mut world, 9, words), Ok(()), "{words}");
+        assert_eq!(read(&mut world), format!("588#4B006201{value}0000"), "{words}");
+    }
+    let refused = apply(&mut world, 5, "mpdo 8 6200:01 1").unwrap_err();
+    assert_eq!(refused, "a cia402 has no application that writes to other nodes");
+}
+
+/// CiA 301, 7.5.2.5: 1005h is the identifier of what such a device would wait for. What its file delivers stays, and does nothing.
+#[test]
+fn without_1005h_nothing_is_taken_that_waits_for_sync() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1007, 0, U32, "rw", 0, false),
+        (0x1019, 0, U8, "rw", 0, false),
+        (0x1400, 1, U32, "rw", 0x209, false),
+        (0x1400, 2, U8, "rw", 1, false),
+        (0x1600, 0, U8, "rw", 1, false),
+        (0x1600, 1, U32, "rw", 0x6200_0108, false),
+        (0x1800, 1, U32, "rw", 0x189, false),
+        (0x1800, 2, U8, "rw", 1, false),
+        (0x1800, 6, U8, "rw", 3, false),
+        (0x1A00, 0, U8, "rw", 1, false),
+        (0x1A00, 1, U32, "rw", 0x6200_0108, false),
+        (0x6200, 1, U8, "rw", 0, true),
+    ]);
+    bench.send("000#0109");
+    bench.send("209#55");
+    assert_eq!((bench.send("080#"), bench.value(0x6200, 1)), (vec![], 0), "as delivered, and without effect");
+    let kinds = [(1, true), (0, false), (2, false), (240, false), (252, false), (251, false), (254, true), (255, true)];
+    for (parameter, (kind, is_taken)) in [0x1400, 0x1800].into_iter().flat_map(|index| kinds.map(|kind| (index, kind)))
+    {
+        let expected = if is_taken { None } else { Some(0x0609_0030) };
+        assert_eq!(bench.write(parameter, 2, 1, kind), expected, "{parameter:04X}h, type {kind}");
+    }
+    assert_eq!(bench.write(0x1800, 2, 1, 253), None, "remote frames need no SYNC");
+    assert_eq!(bench.write(0x1800, 2, 1, 1), Some(0x0609_0030), "as delivered it was, and is not any more");
+    bench.write(0x1800, 1, 4, 0x8000_0189);
+    for (index, sub_index, bytes, own) in [(0x1007, 0, 4, 0), (0x1019, 0, 1, 0), (0x1800, 6, 1, 3)] {
+        assert_eq!(bench.write(index, sub_index, bytes, own), None, "{index:04X}h");
+        assert_eq!(bench.write(index, sub_index, bytes, 5), Some(0x0609_0030), "{index:04X}h");
+    }
 }
 
 #[test]

@@ -99,7 +99,7 @@ impl<S: Storage> Node<S> {
             (0x1201..=0x12FF, _) => sdo::parameter::check(&values, mux, raw),
             (0x1016, _) if mux.sub_index > 0 => heartbeat::check_watched_once(&values, mux, raw),
             (0x1014, _) => self.emcy_cob_id().check_change(CobId(raw), self.profile.pdo_changes_while_valid),
-            (_, Some((pdo, false))) => self.check_parameter(&values, mux, raw, pdo.direction),
+            (_, Some((pdo, false))) => self.check_parameter(&values, mux, raw, pdo),
             (_, Some((pdo, true))) => self.check_mapping(&values, mux, raw, pdo),
             _ => Ok(()),
         }
@@ -113,16 +113,24 @@ impl<S: Storage> Node<S> {
         if in_use && present.can_id() != new.can_id() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
     }
 
-    fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32, direction: Direction) -> Result<(), AbortCode> {
+    fn check_parameter(&self, values: &View<'_>, mux: Mux, raw: u32, pdo: PdoId) -> Result<(), AbortCode> {
+        let direction = pdo.direction;
         let while_valid = self.profile.pdo_changes_while_valid;
         let parameter = Parameter::read(values, mux.index);
         match mux.sub_index {
-            COB_ID => parameter.cob_id.check_change(CobId(raw), while_valid),
+            COB_ID => {
+                parameter.cob_id.check_change(CobId(raw), while_valid)?;
+                let becomes_valid = CobId(raw).is_valid() && !parameter.cob_id.is_valid();
+                if becomes_valid { self.check_multiplexed(pdo, parameter.transmission_type) } else { Ok(()) }
+            }
             TRANSMISSION_TYPE => {
                 let may_be_remote =
                     direction == Direction::Tpdo && self.profile.remote_requests && parameter.cob_id.allows_rtr();
-                let is_remote = TransmissionType::from_raw(raw as u8)?.is_remote();
-                if is_remote && !may_be_remote { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+                let wanted = TransmissionType::from_raw(raw as u8)?;
+                if wanted.is_remote() && !may_be_remote {
+                    return Err(AbortCode::INVALID_VALUE);
+                }
+                if parameter.cob_id.is_valid() { self.check_multiplexed(pdo, wanted) } else { Ok(()) }
             }
             SYNC_START_VALUE if direction == Direction::Tpdo && raw > u32::from(sync::MAX_COUNTER) => {
                 Err(AbortCode::INVALID_VALUE)
@@ -132,6 +140,12 @@ impl<S: Storage> Node<S> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// A valid TPDO that is multiplexed is sent by events alone (CiA 301, 7.2.3).
+    fn check_multiplexed(&self, pdo: PdoId, wanted: TransmissionType) -> Result<(), AbortCode> {
+        let is_multiplexed = pdo.direction == Direction::Tpdo && self.address_mode(pdo.mapping_index()).is_some();
+        if is_multiplexed && !wanted.is_event_driven() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
     }
 
     /// Entries may be written while sub-index 00h is 0; sub-index 00h when all entries then in use fit.

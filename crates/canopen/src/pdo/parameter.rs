@@ -57,6 +57,11 @@ impl TransmissionType {
     pub const fn is_synchronous(self) -> bool {
         matches!(self, Self::SynchronousAcyclic | Self::SynchronousCyclic(_))
     }
+
+    /// True for 254 and 255.
+    pub const fn is_event_driven(self) -> bool {
+        matches!(self, Self::EventDrivenManufacturer | Self::EventDrivenProfile)
+    }
 }
 
 /// A communication record as it stands in the dictionary. What the record lacks is 0; without COB-ID it is invalid.

@@ -11,7 +11,7 @@ use canopen::node::{Node, NodeEvent, NodeProfile, Ticket, Via};
 use canopen::object::ERROR_REGISTER;
 use canopen::od::{Dictionary, Entry, Slot, Storage};
 use canopen::pdo::PdoNumber;
-use canopen::{AbortCode, NmtCommand, NmtState, NodeId};
+use canopen::{AbortCode, Mux, NmtCommand, NmtState, NodeId};
 
 use super::communication_errors::CommunicationErrors;
 use super::storage::{Store, StoredImage};
@@ -231,6 +231,12 @@ impl<S: Storage> Device<S> {
     /// See [`Node::send_by_source`].
     pub fn send_by_source(&mut self, slot: Slot, now: Instant) -> bool {
         self.node.send_by_source(slot, now)
+    }
+
+    /// As [`Node::send_to_destination`] with the first of these TPDOs that has nothing to send.
+    pub fn send_to_destination(&mut self, to: Option<NodeId>, object: Mux, data: [u8; 4], now: Instant) -> bool {
+        let mut numbers = (0..).map_while(PdoNumber::at);
+        numbers.any(|number| self.node.send_to_destination(number, to, object, data, now))
     }
 
     /// What happened since, in the order of arrival.

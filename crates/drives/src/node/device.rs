@@ -165,6 +165,13 @@ impl<S: Storage> DescribedNode<S> {
         Ok(())
     }
 
+    /// Its application writes a value to an object of another node, or of all, by a TPDO in destination address mode (FFh in
+    /// sub-index 00h of its mapping; CiA 301, 7.2.3). False if there is none that has nothing to send, or the node is not
+    /// operational.
+    pub fn send_to_destination(&mut self, to: Option<NodeId>, object: Mux, data: [u8; 4], now: Instant) -> bool {
+        self.base.device.send_to_destination(to, object, data, now)
+    }
+
     /// Where an object is, if the device has it.
     pub fn find(&self, mux: Mux) -> Option<Slot> {
         self.description.dictionary.find(mux).ok()

@@ -22,6 +22,7 @@ pub use memory::{Memory, image_size, is_makers_mark, is_storable};
 pub use overheard::Overheard;
 pub use profile::profile_conditions;
 pub(crate) use profile::refused;
+pub(crate) use services::no_destinations;
 pub use services::{Services, Written};
 
 use canopen::Mux;

@@ -3,11 +3,13 @@
 
 use canopen::AbortCode;
 use canopen::Mux;
+use canopen::object::{COB_ID_SYNC_MESSAGE, COMMUNICATION_CYCLE_PERIOD};
 use canopen::od::{Condition, Dictionary, Slot, Storage, View};
 use devices::Description;
 
 use super::encoder::{self, CYCLIC_TIMER, Encoder};
 use super::io::{self, Io};
+use super::services::no_effect;
 
 /// The event timer of the first TPDO.
 const EVENT_TIMER: Mux = Mux::new(0x1800, 5);
@@ -40,8 +42,12 @@ pub fn profile_conditions(description: &'static Description) -> impl Iterator<It
         let of_profile = (0x6000..=0x67FF).contains(&row.index);
         has_profile && of_profile && row.access.is_writable() && !acts_on(description, row.mux())
     });
+    let is_deaf_to_sync = table.find(COB_ID_SYNC_MESSAGE).is_err();
+    // A drive has it for the set-points that it interpolates, too.
+    let period = table.find(COMMUNICATION_CYCLE_PERIOD).ok().filter(|_| is_deaf_to_sync);
+    let period = period.map(|slot| (slot, Condition::Change(no_effect)));
     let own = Profile::of(description).is_encoder().then(|| encoder::conditions(table)).into_iter().flatten();
-    rows.map(|(slot, _)| (slot, Condition::Change(refused))).chain(own)
+    rows.map(|(slot, _)| (slot, Condition::Change(refused))).chain(own).chain(period)
 }
 
 /// Nothing would come of it.

@@ -7,11 +7,13 @@ use canopen::guarding::Guarding;
 use canopen::heartbeat::{Consumer, ConsumerEvent, MAX_CONSUMERS};
 use canopen::node::Via;
 use canopen::object::{
-    COB_ID_EMCY, COB_ID_TIME_STAMP_OBJECT, CONFIGURATION_DATE, CONFIGURATION_TIME, EMERGENCY_CONSUMER_OBJECT,
-    GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME,
+    COB_ID_EMCY, COB_ID_SYNC_MESSAGE, COB_ID_TIME_STAMP_OBJECT, CONFIGURATION_DATE, CONFIGURATION_TIME,
+    EMERGENCY_CONSUMER_OBJECT, GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME,
+    SYNCHRONOUS_COUNTER_OVERFLOW_VALUE, SYNCHRONOUS_WINDOW_LENGTH,
 };
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
-use canopen::pdo::{AddressMode, PdoNumber, TPDO_MAPPING};
+use canopen::pdo::parameter::{SYNC_START_VALUE, TRANSMISSION_TYPE};
+use canopen::pdo::{AddressMode, PdoNumber, RPDO_PARAMETER, TPDO_MAPPING, TPDO_PARAMETER, TransmissionType};
 use canopen::{AbortCode, CobId, Mux, NmtState, NodeId};
 
 use super::memory::Memory;
@@ -32,6 +34,10 @@ const RESTORE: u16 = 0x1011;
 const WATCH: u16 = 0x1016;
 const TIME_COB_ID: u16 = COB_ID_TIME_STAMP_OBJECT.index;
 const EMCY_CONSUMER: u16 = EMERGENCY_CONSUMER_OBJECT.index;
+const SYNC_WINDOW: u16 = SYNCHRONOUS_WINDOW_LENGTH.index;
+const SYNC_OVERFLOW: u16 = SYNCHRONOUS_COUNTER_OVERFLOW_VALUE.index;
+const LAST_RPDO_PARAMETER: u16 = RPDO_PARAMETER + PdoNumber::MAX - 1;
+const LAST_TPDO_PARAMETER: u16 = TPDO_PARAMETER + PdoNumber::MAX - 1;
 const LAST_TPDO_MAPPING: u16 = TPDO_MAPPING + PdoNumber::MAX - 1;
 
 /// The services of one device.
@@ -283,6 +289,7 @@ impl<S: Storage> Services<S> {
 /// What a device with these objects refuses beyond its rows: for [`Conditions`](canopen::od::Conditions).
 pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
     let may_name_more = table.find(Mux::new(WATCH, CONSUMERS as u8 + 1)).is_ok();
+    let hears_sync = table.find(COB_ID_SYNC_MESSAGE).is_ok();
     table.iter().filter_map(move |(slot, row)| {
         let condition = match (row.index, row.sub_index) {
             (HISTORY, 0) => Condition::Check(only_zero),
@@ -290,7 +297,16 @@ pub(super) fn conditions(table: &'static Table) -> impl Iterator<Item = (Slot, C
             (RESTORE, 1..) => Condition::Check(only_load),
             (WATCH, 1..) if may_name_more => Condition::Change(no_more_than_are_watched),
             (TIME_COB_ID, 0) => Condition::Change(no_time_producer),
-            (TPDO_MAPPING..=LAST_TPDO_MAPPING, 0) => Condition::Check(no_destinations),
+            (RPDO_PARAMETER..=LAST_RPDO_PARAMETER | TPDO_PARAMETER..=LAST_TPDO_PARAMETER, TRANSMISSION_TYPE)
+                if !hears_sync =>
+            {
+                Condition::Change(no_sync)
+            }
+            (TPDO_PARAMETER..=LAST_TPDO_PARAMETER, SYNC_START_VALUE) | (SYNC_WINDOW | SYNC_OVERFLOW, 0)
+                if !hears_sync =>
+            {
+                Condition::Change(no_effect)
+            }
             _ => return None,
         };
         Some((slot, condition))
@@ -315,8 +331,26 @@ fn no_time_producer(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     if CobId(raw).generates() { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
 }
 
-/// A TPDO in destination address mode: these devices have no application that writes to objects of others.
-fn no_destinations(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+/// What waits for SYNC, of a device without 1005h: it hears none (CiA 301, 7.5.2.5). A file may deliver it.
+fn no_sync(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
+    match TransmissionType::from_raw(raw as u8)? {
+        TransmissionType::RemoteEventDriven => Ok(()),
+        wanted if wanted.is_event_driven() => Ok(()),
+        _ => Err(AbortCode::INVALID_VALUE),
+    }
+}
+
+pub(super) fn no_effect(_: &View<'_>, _: u32) -> Result<(), AbortCode> {
+    Err(AbortCode::INVALID_VALUE)
+}
+
+/// Of a device whose firmware writes to no objects of others: a TPDO in destination address mode would never be sent.
+pub(crate) fn no_destinations(table: &'static Table) -> impl Iterator<Item = (Slot, Condition)> {
+    let mappings = table.iter().filter(|(_, row)| (TPDO_MAPPING..=LAST_TPDO_MAPPING).contains(&row.index));
+    mappings.filter(|(_, row)| row.sub_index == 0).map(|(slot, _)| (slot, Condition::Change(is_not_destination)))
+}
+
+fn is_not_destination(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
     match AddressMode::from_count(raw as u8) {
         Some(AddressMode::Destination) => Err(AbortCode::PDO_TOO_LONG),
         _ => Ok(()),

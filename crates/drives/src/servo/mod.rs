@@ -84,7 +84,8 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         is_of_profile(row) && is_taken && !is_stored
     });
     let without_effect = without_effect.map(|(slot, _)| (slot, Condition::Change(node::refused)));
-    let others = stops.chain(factors).chain(without_effect).chain(node::conditions(table));
+    let others =
+        stops.chain(factors).chain(without_effect).chain(node::conditions(table)).chain(node::no_destinations(table));
     modes.chain(set_points).chain(methods).chain(types).chain(others)
 }
 

@@ -493,6 +493,14 @@ class VirtualDrive:
         """
         self._do("object", index, sub_index, value if isinstance(value, (float, str)) else int(value))
 
+    def send_mpdo(self, node: Optional[int], index: int, sub_index: int, value: int) -> None:
+        """The application of such a node writes to an object of another node, or of all (None), by a multiplexed PDO in destination
+        address mode (``mpdo 7 6200:01 FFh``); FFh in sub-index 00h of its TPDO's mapping makes one (CiA 301, 7.2.3).
+
+        >>> sensor.send_mpdo(7, 0x6200, 1, 0xFF)
+        """
+        self._do("mpdo", 0 if node is None else int(node), index, sub_index, int(value))
+
 
 def real(name: str, value: Optional[Number]) -> Optional[float]:
     """The number, if there is one."""

@@ -5,13 +5,13 @@
 use std::time::Duration;
 
 use can::Frame;
-use canopen::Mux;
+use canopen::{Mux, NodeId};
 use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sim::stimulus::{
-    BodyStimulus, BusFault, Component, Friction, LoadKind, LoadPart, ObjectValue, Power, PulseTrain, Source, Stimulus,
-    SwitchRange, TemperatureSensor, WireFault,
+    BodyStimulus, BusFault, Component, Friction, LoadKind, LoadPart, MPDO_VALUES, ObjectValue, Power, PulseTrain,
+    Source, Stimulus, SwitchRange, TemperatureSensor, WireFault,
 };
 
 use crate::failure::{bad_value, refused};
@@ -65,6 +65,7 @@ pub(super) fn of_node(name: &str, values: Values<'_, '_>) -> PyResult<Stimulus> 
             let mux = Mux::new(whole(values, 0, "an index")?, whole(values, 1, "a sub-index")?);
             Stimulus::Object { mux, value: object_value(values, 2)? }
         }
+        "mpdo" => mpdo(values)?,
         _ => match (load(name, values)?, bus(name, values)?) {
             (Some(part), _) => Stimulus::Load(part),
             (_, Some(fault)) => Stimulus::Bus(fault),
@@ -124,6 +125,22 @@ fn bus(name: &str, values: Values<'_, '_>) -> PyResult<Option<BusFault>> {
         _ => return Ok(None),
     };
     fault.map(Some).map_err(refused)
+}
+
+/// To node 0, which is all; the value is one of up to four bytes.
+fn mpdo(values: Values<'_, '_>) -> PyResult<Stimulus> {
+    let out_of_range = |what, value: String| refused(format!("{value} is out of range for {what}"));
+    let node: u8 = whole(values, 0, "a node")?;
+    let to = NodeId::new(node);
+    if to.is_none() && node != 0 {
+        return Err(out_of_range("a node", node.to_string()));
+    }
+    let object = Mux::new(whole(values, 1, "an index")?, whole(values, 2, "a sub-index")?);
+    let value: i64 = whole(values, 3, "a value of up to four bytes")?;
+    if !MPDO_VALUES.contains(&value) {
+        return Err(out_of_range("a value of up to four bytes", value.to_string()));
+    }
+    Ok(Stimulus::Mpdo { to, object, value })
 }
 
 /// What is done to a machine that several drives move.

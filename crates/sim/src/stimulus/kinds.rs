@@ -1,6 +1,8 @@
 //! What the outer world does to a node, as values.
 
-use canopen::Mux;
+use std::ops::RangeInclusive;
+
+use canopen::{Mux, NodeId};
 
 use super::bus_fault::BusFault;
 use super::load::LoadPart;
@@ -56,7 +58,20 @@ pub enum Stimulus {
         /// Its value.
         value: ObjectValue,
     },
+    /// `mpdo 7 6200:01 FFh`, `mpdo all 6200:01 FFh`: the application of such a node writes to an object of another, or of all, by a
+    /// multiplexed PDO in destination address mode (CiA 301, 7.2.3).
+    Mpdo {
+        /// The other node; `None` for all.
+        to: Option<NodeId>,
+        /// Its object.
+        object: Mux,
+        /// Up to four bytes: [`MPDO_VALUES`].
+        value: i64,
+    },
 }
+
+/// What an MPDO carries: 32 bits, with a sign or without.
+pub const MPDO_VALUES: RangeInclusive<i64> = i32::MIN as i64..=u32::MAX as i64;
 
 /// What happens to the supply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,12 +2,12 @@
 
 use std::str::FromStr;
 
-use canopen::Mux;
+use canopen::{Mux, NodeId};
 
 use super::body;
 use super::bus_fault::{self, BusFault};
 use super::error::StimulusError;
-use super::kinds::{Component, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
+use super::kinds::{Component, MPDO_VALUES, ObjectValue, Power, PulseTrain, Source, Stimulus, TemperatureSensor};
 use super::load::{self, LoadPart};
 use super::words::{excerpt, number, range};
 
@@ -35,6 +35,7 @@ impl FromStr for Stimulus {
             "cable" => Ok(Self::CableCut(choice(arguments, "cut", "join", CABLE)?)),
             "bus" => BusFault::parse(arguments).map(Self::Bus),
             "set" => parse_set(text),
+            "mpdo" => parse_mpdo(arguments),
             _ => Err(StimulusError::Unknown(excerpt(verb))),
         }
     }
@@ -57,6 +58,7 @@ const DUTY: &str = "NODE duty PERCENT";
 const CLOCK: &str = "NODE clock HZ";
 const CABLE: &str = "NODE cable cut|join";
 const SET: &str = "NODE set OBJECT VALUE";
+const MPDO: &str = "NODE mpdo OTHER|all OBJECT VALUE";
 /// The form of the line that moves time.
 pub const RUN: &str = "run 20ms, or run until 2.5s (ns, us, ms, s, min, h)";
 /// The form of the question that every node answers.
@@ -91,6 +93,7 @@ pub const FORMS: &[&str] = &[
     bus_fault::OVERRUN,
     bus_fault::CORRUPT,
     SET,
+    MPDO,
     GET,
     body::FORMS[0],
     body::FORMS[1],
@@ -183,6 +186,19 @@ fn parse_set(text: &str) -> Result<Stimulus, StimulusError> {
     let mux = parse_object(object).ok_or_else(|| bad(object, "object"))?;
     let value = value.trim();
     Ok(Stimulus::Object { mux, value: parse_object_value(value).ok_or_else(|| bad(value, "value"))? })
+}
+
+fn parse_mpdo(arguments: &[&str]) -> Result<Stimulus, StimulusError> {
+    let [other, object, value] = arguments else { return Err(StimulusError::Usage(MPDO)) };
+    let bad = |text: &str, what| StimulusError::BadValue { text: text.to_string(), what, usage: MPDO };
+    let node = || other.parse().ok().and_then(NodeId::new).ok_or_else(|| bad(other, "node"));
+    let to = if *other == "all" { None } else { Some(node()?) };
+    let mux = parse_object(object).ok_or_else(|| bad(object, "object"))?;
+    let number = match parse_object_value(value) {
+        Some(ObjectValue::Integer(number)) => i64::try_from(number).ok().filter(|number| MPDO_VALUES.contains(number)),
+        _ => None,
+    };
+    Ok(Stimulus::Mpdo { to, object: mux, value: number.ok_or_else(|| bad(value, "value of up to four bytes"))? })
 }
 
 /// `6000:01`, `6000h:01`, `0x6000`: hexadecimal, as objects are written.

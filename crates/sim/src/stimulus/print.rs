@@ -31,6 +31,8 @@ impl fmt::Display for Stimulus {
             Self::CableCut(cut) => write!(f, "cable {}", if *cut { "cut" } else { "join" }),
             Self::Bus(fault) => fault.fmt(f),
             Self::Object { mux, value } => write!(f, "set {mux:X} {value}"),
+            Self::Mpdo { to: Some(node), object, value } => write!(f, "mpdo {node} {object:X} {value}"),
+            Self::Mpdo { to: None, object, value } => write!(f, "mpdo all {object:X} {value}"),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use canopen::Mux;
+use canopen::{Mux, NodeId};
 
 use super::*;
 use crate::Prng;
@@ -47,7 +47,7 @@ fn any_load(random: &mut Prng) -> LoadPart {
 
 fn any(random: &mut Prng) -> Stimulus {
     let coin = random.below(2) == 0;
-    match random.below(18) {
+    match random.below(19) {
         0 => Stimulus::Power(Power::ALL[random.below(4) as usize]),
         1 => Stimulus::Input { name: name(random), level: coin },
         2 => {
@@ -79,6 +79,11 @@ fn any(random: &mut Prng) -> Stimulus {
         13 => Stimulus::CableCut(coin),
         14 => Stimulus::Bus(bus_fault(random)),
         15 | 16 => Stimulus::Load(any_load(random)),
+        17 => Stimulus::Mpdo {
+            to: NodeId::new(random.below(128) as u8),
+            object: Mux::new(random.next_u64() as u16, random.next_u64() as u8),
+            value: if coin { (random.next_u64() as i32).into() } else { (random.next_u64() as u32).into() },
+        },
         _ => Stimulus::Object {
             mux: Mux::new(random.next_u64() as u16, random.next_u64() as u8),
             value: match random.below(3) {
@@ -135,6 +140,12 @@ fn an_object_is_given_in_any_of_the_usual_spellings() {
         ("set 6000:100 1", "invalid object \"6000:100\"; expected: NODE set OBJECT VALUE"),
         ("set 6000 -FFh", "invalid value \"-FFh\"; expected: NODE set OBJECT VALUE"),
         ("set 6000 \"open", "invalid value \"\\\"open\"; expected: NODE set OBJECT VALUE"),
+        ("mpdo 128 6200 1", "invalid node \"128\"; expected: NODE mpdo OTHER|all OBJECT VALUE"),
+        ("mpdo 7 6200", "expected: NODE mpdo OTHER|all OBJECT VALUE"),
+        (
+            "mpdo all 6200 4294967296",
+            "invalid value of up to four bytes \"4294967296\"; expected: NODE mpdo OTHER|all OBJECT VALUE",
+        ),
         ("set 6000 nan", "invalid value \"nan\"; expected: NODE set OBJECT VALUE"),
     ] {
         assert_eq!(parsed(words).unwrap_err().to_string(), error, "{words}");

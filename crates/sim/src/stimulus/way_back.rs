@@ -35,7 +35,8 @@ impl Stimulus {
             | Self::Battery(true)
             | Self::Pulses(_)
             | Self::CableCut(false)
-            | Self::Object { .. } => return None,
+            | Self::Object { .. }
+            | Self::Mpdo { .. } => return None,
         })
     }
 }

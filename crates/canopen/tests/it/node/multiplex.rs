@@ -134,6 +134,22 @@ fn the_owner_sends_by_source_and_to_destinations() {
     assert_eq!(drain(&mut node), ["184#8040600006000000".parse().unwrap()]);
 }
 
+/// CiA 301, 7.2.3: events alone send it. What it is while it does not exist is its host's affair.
+#[test]
+fn a_valid_multiplexed_tpdo_is_of_type_254_or_255() {
+    let mut node = node_of(NodeProfile::cia_301(table(rows(0xFF, 0xFF, &[], &[]))));
+    let mut refused = |request: &str| answer(&mut node, &format!("604#{request}"))[0].starts_with("584#80");
+    for (kind, is_refused) in [(0, true), (1, true), (240, true), (252, true), (253, true), (254, false), (255, false)]
+    {
+        assert_eq!(refused(&format!("2F001802{kind:02X}000000")), is_refused, "{kind}");
+        // An RPDO takes effect at once, whatever its type is.
+        assert_eq!(refused(&format!("2F001402{kind:02X}000000")), matches!(kind, 252 | 253), "{kind}");
+    }
+    assert!(!refused("2300180184010080"), "it does not exist any more");
+    assert!(!refused("2F00180201000000") && refused("2300180184010000"), "type 1 does not begin to exist");
+    assert!(!refused("2F001802FE000000") && !refused("2300180184010000"));
+}
+
 #[test]
 fn feh_needs_its_list_and_a_device_may_have_no_multiplexed_pdos() {
     let refused = |node: &mut Node<Boxed>, index: u16, count: u8| {

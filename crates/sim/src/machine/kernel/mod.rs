@@ -352,6 +352,9 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             Stimulus::Object { mux, .. } => {
                 return Err(Refused::OwnObjects { model: self.model(), object: mux });
             }
+            Stimulus::Mpdo { .. } => {
+                return Err(Refused::Absent { model: self.model(), what: "application that writes to other nodes" });
+            }
         }
         Ok(())
     }

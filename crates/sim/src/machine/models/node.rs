@@ -256,6 +256,12 @@ impl VirtualDrive for NodeMachine {
             }
             Stimulus::Power(power) => self.switch(*power == Power::On, now),
             Stimulus::Object { mux, value } => return self.set_object(*mux, value, now),
+            Stimulus::Mpdo { to, object, value } => {
+                let data = (*value as u32).to_le_bytes();
+                if !self.firmware.send_to_destination(*to, *object, data, now) {
+                    return Err(Refused::NotSent { model: self.firmware.description().name });
+                }
+            }
             Stimulus::Input { name, level } => {
                 let line = self.input_number(name)?;
                 self.firmware.set_input(line as u8, *level, now);

@@ -206,6 +206,7 @@ impl VirtualDrive for TestDrive {
             Stimulus::Object { mux, .. } => return Err(Refused::OwnObjects { model: "testdrive", object: mux }),
             Stimulus::LoadInertia(_) | Stimulus::Fault(..) | Stimulus::CableCut(_) | Stimulus::Bus(_) => {}
             Stimulus::Load(_) => return Err(absent("such load")),
+            Stimulus::Mpdo { .. } => return Err(absent("multiplexed PDO")),
         }
         Ok(())
     }
