@@ -429,8 +429,9 @@ async fn receive_synchronous(bench: &mut Bench) -> Verdict {
 async fn switched_off(bench: &mut Bench) -> Verdict {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     let tpdo = bench.set_up_tpdo(1, 0).await?;
-    let off = (tpdo.id.raw() | CobId::INVALID).to_le_bytes();
-    if let Err(code) = bench.try_write(Mux::new(tpdo.index, 1), &off).await? {
+    let cob_id = Mux::new(tpdo.index, 1);
+    let off = (bench.number(cob_id).await? as u32 | CobId::INVALID).to_le_bytes();
+    if let Err(code) = bench.try_write(cob_id, &off).await? {
         not_applicable!("the PDO cannot be switched off: {code}");
     }
     bench.nmt(NmtCommand::Start).await;

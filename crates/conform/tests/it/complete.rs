@@ -69,6 +69,13 @@ pub(crate) fn producing_sync() -> &'static Description {
     described(rows)
 }
 
+/// The same without remote frames, which bit 30 of its transmit PDO says.
+pub(crate) fn without_remote_frames() -> &'static Description {
+    let mut rows = ROWS.to_vec();
+    rows.iter_mut().filter(|row| (row.0, row.1) == (0x1800, 1)).for_each(|row| row.4 = "$NODEID+0x40000180");
+    described(rows)
+}
+
 /// The same without SYNC.
 pub(crate) fn without_sync() -> &'static Description {
     described(ROWS.iter().filter(|row| !matches!(row.0, 0x1005 | 0x1006 | 0x1019)).copied().collect())

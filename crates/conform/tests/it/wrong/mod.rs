@@ -9,14 +9,15 @@ mod servers;
 mod station;
 mod transfer;
 
+use canopen::CobId;
 use conform::{Options, Outcome, Report, Subject, all};
 use devices::Description;
 use sim::Fidelity;
 
 use crate::bench::{drive_with, node, run, shown};
-use crate::complete::{complete, extended, producing_sync, with_fixed_mappings, without_sync};
+use crate::complete::{complete, extended, producing_sync, with_fixed_mappings, without_remote_frames, without_sync};
 use causes::Cause;
-use station::{Kind, Wrong};
+use station::{Kind, Wrong, abort, writes, written};
 
 /// A node that is right but for one thing.
 pub(crate) struct Defect {
@@ -120,15 +121,40 @@ fn the_sync_of_a_node_that_produces_it_is_not_taken_for_that_of_a_case() {
     assert_eq!(passed, synchronous);
 }
 
+/// By a file without it, of a node that refuses to wait for SYNC, and of one that takes every type and hears none.
 #[test]
 fn nothing_synchronous_is_asked_of_a_device_without_1005h() {
-    let synchronous = ["PDO 06", "PDO 07", "PDO 55", "PDO 58"];
-    let options = Options { only: synchronous.map(Into::into).to_vec(), ..without_drives() };
-    let report = report_of(without_sync(), Kind::Right, options);
-    for case in report.cases.iter().filter(|case| synchronous.contains(&case.id)) {
-        let why = "the device has no object 1005h, and takes no SYNC";
-        assert_eq!((case.result, &*case.why), (Outcome::NotApplicable, why), "{}", case.id);
+    let deaf = Kind::Hear(|_, frame| if frame.standard_data_id() == Some(0x80) { vec![] } else { vec![frame] });
+    let types = [("PDO 06", 2), ("PDO 07", 0), ("PDO 55", 1), ("PDO 58", 1)];
+    for (description, kind) in [(without_sync(), Kind::Right), (complete(), deaf)] {
+        let station = Wrong::new(drive_with(description, Fidelity::Full), kind);
+        let options = Options { only: types.map(|(id, _)| id.into()).to_vec(), ..without_drives() };
+        let report = run(station, Subject::of_model(node(), without_sync()), options);
+        for (id, transmission) in types {
+            let case = report.cases.iter().find(|case| case.id == id).unwrap();
+            let why = match kind {
+                Kind::Right => format!(
+                    "the device does not take transmission type {transmission}: 0609 0030h (invalid value for parameter)"
+                ),
+                _ => "the device has no object 1005h, and takes no SYNC".to_owned(),
+            };
+            assert_eq!((case.result, &*case.why), (Outcome::NotApplicable, &*why), "{id}");
+        }
     }
+}
+
+/// It refuses COB-IDs without bit 30 (CiA 301, 7.5.2.37).
+#[test]
+fn a_device_without_remote_frames_passes_and_its_pdo_is_switched_off_by_bit_31_alone() {
+    let refuses = Kind::Answer(|_, request| {
+        let allows_rtr = writes(&request, 0x1800, 1) && written(&request) & CobId::NO_RTR == 0;
+        allows_rtr.then(|| abort(&request, 0x0609_0030))
+    });
+    let options = Options { only: vec!["PDO".into(), "OTHER 10".into()], ..without_drives() };
+    let report = report_of(without_remote_frames(), refuses, options);
+    assert!(report.ok, "{:?}\n{}", report.not_restored, shown(&report, crate::bench::failed));
+    let result = |id| report.cases.iter().find(|case| case.id == id).map(|case| case.result);
+    assert_eq!(["PDO 06", "PDO 56"].map(result), [Some(Outcome::Pass); 2]);
 }
 
 /// Cases about objects that the complete device of today does not have.
