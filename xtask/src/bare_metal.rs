@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::process::quietly;
 use crate::say::say;
@@ -24,31 +25,37 @@ const TARGET: Target = Target {
 const PROGRAMS: [(&str, &str); 2] =
     [("node_main", "a node with 30 objects"), ("zlac8030l_main", "the whole ZLAC8030L")];
 
+/// The core crates compile.
 pub(crate) fn step() -> Tally {
-    let rust = match Rust::found(TARGET, &folder()) {
-        Ok(rust) => rust,
-        Err(reason) => return Tally::skipped(reason),
-    };
-    match check(&rust).and_then(|()| sizes(&rust)) {
-        Ok(lines) => {
-            lines.iter().for_each(say);
-            Tally::of_check(true, "")
-        }
-        Err(error) => Tally::failed(error),
-    }
-}
-
-/// What the step takes of others.
-pub(crate) fn fetch() -> Result<(), String> {
-    Rust::found(TARGET, &folder()).map(|_| ())
-}
-
-fn check(rust: &Rust) -> Result<(), String> {
-    let packages = tidy::NO_STD.iter().flat_map(|name| ["--package".to_owned(), format!("ferrodrive-{name}")]);
-    quietly(rust.cargo(&["check"]).args(packages))
+    with_rust(|rust| {
+        let packages = tidy::NO_STD.iter().flat_map(|name| ["--package".to_owned(), format!("ferrodrive-{name}")]);
+        quietly(rust.cargo(&["check"]).args(packages))
+    })
 }
 
 /// Links both programs and says what each takes.
+pub(crate) fn sizes_step() -> Tally {
+    with_rust(|rust| sizes(rust).map(|lines| lines.iter().for_each(say)))
+}
+
+/// What the steps take of others.
+pub(crate) fn fetch() -> Result<(), String> {
+    rust().map(|_| ())
+}
+
+fn with_rust(run: impl Fn(&Rust) -> Result<(), String>) -> Tally {
+    match rust() {
+        Ok(rust) => run(rust).map_or_else(Tally::failed, |()| Tally::passed()),
+        Err(reason) => Tally::skipped(reason),
+    }
+}
+
+/// Looked for once in a run: where it cannot be had, that takes a while.
+fn rust() -> Result<&'static Rust, String> {
+    static FOUND: OnceLock<Result<Rust, String>> = OnceLock::new();
+    FOUND.get_or_init(|| Rust::found(TARGET, &folder())).as_ref().map_err(Clone::clone)
+}
+
 fn sizes(rust: &Rust) -> Result<Vec<String>, String> {
     let words = ["rustc", "--profile", "flash", "--package", "ferrodrive-bare-metal", "--crate-type", "staticlib"];
     quietly(&mut rust.cargo(&words))?;

@@ -50,6 +50,7 @@ pub(crate) const STEPS: &[Step] = &[
         when: When::Quick,
         run: program::demo,
     },
+    Step { name: "core", does: "the core crates compile for a Cortex-M4F", when: When::Quick, run: bare_metal::step },
     Step {
         name: "build",
         does: "the programs and tests that the steps behind this one run",
@@ -61,9 +62,9 @@ pub(crate) const STEPS: &[Step] = &[
     Step { name: "packages", does: "every crate packs, as cargo publish would", when: When::Busy, run: packages::run },
     Step {
         name: "no_std",
-        does: "the core crates build for a Cortex-M4F, and what they take of it",
+        does: "what a node and a drive take of a Cortex-M4F",
         when: When::Busy,
-        run: bare_metal::step,
+        run: bare_metal::sizes_step,
     },
     Step {
         name: "python",
@@ -134,9 +135,9 @@ pub(crate) type Fetch = fn() -> Result<(), String>;
 /// What steps take of others, in the order in which it is needed. It is fetched while the quick list computes, since a download
 /// leaves the processor idle; a step whose part cannot be had reports that itself.
 pub(crate) const FETCHES: &[(&str, Fetch)] = &[
+    ("core", bare_metal::fetch),
     ("studio", browser::fetch),
     ("vcan", vcan::fetch),
-    ("no_std", bare_metal::fetch),
     ("python", python::fetch),
     ("peers", peers::fetch),
     ("dist", wheel::fetch),

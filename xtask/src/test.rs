@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn without_options_the_quick_list_runs_and_with_all_every_step() {
-        assert_eq!(names(&[]), ["fmt", "tidy", "tests", "doctests", "demo"]);
+        assert_eq!(names(&[]), ["fmt", "tidy", "tests", "doctests", "demo", "core"]);
         assert_eq!(
             STEPS.iter().map(|step| step.name).filter(|name| !names(&["--all"]).contains(name)).collect::<Vec<_>>(),
             ["web", "aarch64"]
