@@ -87,6 +87,7 @@ enum Length {
     Known(usize),
     /// The byte that decides has not come.
     Missing,
+    /// It says none, or one that no frame has.
     Unknown,
 }
 
@@ -94,7 +95,11 @@ enum Length {
 fn request_length(frame: &[u8]) -> Length {
     let Some(function) = frame.get(1) else { return Length::Missing };
     let counted = |at: usize| match frame.get(1 + at) {
-        Some(bytes) => Length::Known(AROUND + at + 1 + usize::from(*bytes)),
+        // A longer one would be awaited beyond the bytes that are kept.
+        Some(bytes) => match AROUND + at + 1 + usize::from(*bytes) {
+            length @ ..=MAX_FRAME => Length::Known(length),
+            _ => Length::Unknown,
+        },
         None => Length::Missing,
     };
     match function {
@@ -164,12 +169,29 @@ mod tests {
     #[test]
     fn a_request_behind_noise_is_found_at_the_latest_at_the_silence() {
         let read = framed(&[7, 3, 0, 0, 0, 1]);
-        // A write of FFh bytes is awaited for as long as the line is not silent.
-        for noise in [&[0][..], &[0xFF; 40], &[9, 0x10, 0, 0, 0, 1, 0xFF], &read[..5], &[7, 3]] {
+        // A write of F7h bytes is awaited for as long as the line is not silent.
+        for noise in [&[0][..], &[0xFF; 40], &[9, 0x10, 0, 0, 0, 1, 0xF7], &read[..5], &[7, 3]] {
             let mut line = SerialLine::default();
             line.receive(&[noise, &read].concat());
             let adu = line.take().or_else(|| line.take_at_silence());
             assert_eq!(adu.map(|adu| adu.pdu), Some(read[1..6].to_vec()), "{noise:02X?}");
+        }
+    }
+
+    #[test]
+    fn what_is_longer_than_a_frame_by_its_own_account_hides_no_request_however_it_arrives() {
+        let read = framed(&[7, 3, 0, 0, 0, 1]);
+        // A write of FFh bytes and a read and write of FFh would be 264 and 268 bytes long.
+        for head in [&[9, 0x10, 0, 0, 0, 1, 0xFF][..], &[9, 0x17, 0, 0, 0, 1, 0, 0, 0, 1, 0xFF]] {
+            let all = [head, &read.repeat(32)].concat();
+            for piece in [1, 7, 256, all.len()] {
+                let mut line = SerialLine::default();
+                let taken = all.chunks(piece).map(|bytes| {
+                    line.receive(bytes);
+                    std::iter::from_fn(|| line.take()).count()
+                });
+                assert_eq!(taken.sum::<usize>(), 32, "{head:02X?} in pieces of {piece}");
+            }
         }
     }
 
