@@ -76,6 +76,62 @@ def test_a_path_of_points_is_followed(world, network):
             group.follow([[0, 0]])
 
 
+def path_file(folder, from_deg=(0, 0), by_deg=(45, -45), seconds=0.5):
+    """A cycloid of each axis: from rest and to rest, its acceleration too."""
+    path = folder / "path.csv"
+    shares = [row / 50 for row in range(51)]
+    parts = [share - math.sin(math.tau * share) / math.tau for share in shares]
+    rows = [[share * seconds, *(begin + by * part for begin, by in zip(from_deg, by_deg))] for share, part in zip(shares, parts)]
+    head = ["t_s", *(f"{node}.angle_deg" for node in range(1, len(by_deg) + 1))]
+    path.write_text("".join(",".join(map(str, row)) + "\n" for row in [head, *rows]))
+    return path
+
+
+def test_a_recorded_path_is_followed_in_its_time(world, network, tmp_path):
+    before = [world[node].shaft_angle_rad for node in (1, 2)]
+
+    def turned():
+        network.sleep(0.2)
+        return [math.degrees(world[node].shaft_angle_rad - angle) for node, angle in zip((1, 2), before)]
+
+    with network.group(servos(), period=0.001) as group:
+        begin = world.now
+        assert group.follow_file(path_file(tmp_path)) == pytest.approx(0.5)
+        assert 0.5 < world.now - begin < 0.65
+        assert turned() == pytest.approx([45, -45], abs=1)
+        # It counts from where the axes are held, or they are led to where it begins.
+        group.follow_file(path_file(tmp_path, from_deg=(720, 0)), relative=True)
+        assert turned() == pytest.approx([90, -90], abs=1)
+        group.follow_file(path_file(tmp_path, from_deg=(30, 0)), approach=True)
+        assert turned() == pytest.approx([75, -45], abs=1)
+        # An axis that it does not name stays where it is.
+        group.follow_file(path_file(tmp_path, by_deg=(-45,)), relative=True)
+        assert turned() == pytest.approx([30, -45], abs=1)
+
+
+def test_a_recorded_path_that_cannot_be_followed_moves_nothing(world, network, tmp_path):
+    before = [world[node].shaft_angle_rad for node in (1, 2)]
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("t_s,1.angle_deg\n0,0\n0,1\n")
+    with network.group(servos(range_deg=(-180, 180)), period=0.001) as group:
+        refused = [
+            ({"from_deg": (10, 0)}, "not_at_start", "node 1 stands at 0 deg and the path begins at 10 deg"),
+            ({"by_deg": (200, 0), "seconds": 5}, "out_of_limits", "outside its software limits"),
+            ({"seconds": 0.05}, "out_of_limits", "would need"),
+            (wrong, "bad_file", "its times do not rise"),
+            (tmp_path / "none.csv", "bad_file", "none.csv"),
+        ]
+        for path, kind, said in refused:
+            path = path_file(tmp_path, **path) if isinstance(path, dict) else path
+            with pytest.raises(ferrodrive.MasterError, match=said) as raised:
+                group.follow_file(path)
+            assert raised.value.kind == kind
+        with pytest.raises(ferrodrive.BadRequest, match="positions of node 3, and the axes of the group are 1, 2"):
+            group.follow_file(path_file(tmp_path, from_deg=(0, 0, 0), by_deg=(1, 1, 1)))
+        assert group.state()["phase"] == "holding"
+    assert [world[node].shaft_angle_rad for node in (1, 2)] == pytest.approx(before, abs=1e-3)
+
+
 def test_what_breaks_a_limit_moves_nothing(world, network):
     with network.group(servos(range_deg=(-180, 180)), period=0.001) as group:
         for wrong, said in [([181, 0], "outside its software limits"), ([0], "2 axes"), ([math.nan, 0], "finite number")]:

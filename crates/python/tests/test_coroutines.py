@@ -54,7 +54,7 @@ def test_parameters_of_two_nodes_are_read_and_written_at_the_same_time(world, tm
     run(world, main)
 
 
-def test_a_group_moves_while_the_loop_does_something_else(world):
+def test_a_group_moves_while_the_loop_does_something_else(world, tmp_path):
     axes = [ferrodrive.Axis(node, "cia402", **SERVO) for node in (1, 2)]
     before = [world[node].shaft_angle_rad for node in (1, 2)]
 
@@ -82,6 +82,10 @@ def test_a_group_moves_while_the_loop_does_something_else(world):
             await network.async_sleep(0.5)
             assert at < 1400 and turned()[0] == pytest.approx(at, abs=1)
             await group.follow([[axis["set_point_deg"] for axis in group.state()["axes"]]] * 20)
+            path = tmp_path / "path.csv"
+            path.write_text("t_s,1.angle_deg\n0,0\n0.5,-90\n1,-180\n")
+            assert await group.follow_file(path, relative=True) == 1.0
+            assert turned()[0] == pytest.approx(at - 180, abs=1)
         assert (await network.async_drive(1, "cia402").state())["power"] != "Operation enabled"
 
     run(world, main)

@@ -38,7 +38,7 @@ offset_m = [0.3, 0, 0]
 mass_kg = 1.0
 center_m = [0.12, 0, 0]
 """
-#: A module with eight inputs (CiA 401).
+#: A module with eight inputs (CiA 401), which can write to objects of others by a multiplexed PDO.
 SENSOR = """[FileInfo]
 FileName=sensor.eds
 [DeviceInfo]
@@ -46,15 +46,17 @@ VendorName=none
 ProductName=sensor
 BaudRate_500=1
 NrOfRXPDO=0
-NrOfTXPDO=0
+NrOfTXPDO=1
 [MandatoryObjects]
 SupportedObjects=3
 1=0x1000
 2=0x1001
 3=0x1018
 [OptionalObjects]
-SupportedObjects=1
-1=0x6000
+SupportedObjects=3
+1=0x1800
+2=0x1A00
+3=0x6000
 [1000]
 ParameterName=Device type
 ObjectType=0x7
@@ -83,6 +85,38 @@ ObjectType=0x7
 DataType=0x0007
 AccessType=ro
 DefaultValue=0
+[1800]
+ParameterName=TPDO communication parameter
+ObjectType=0x9
+SubNumber=3
+[1800sub0]
+ParameterName=Highest sub-index supported
+ObjectType=0x7
+DataType=0x0005
+AccessType=const
+DefaultValue=2
+[1800sub1]
+ParameterName=COB-ID used by TPDO
+ObjectType=0x7
+DataType=0x0007
+AccessType=rw
+DefaultValue=$NODEID+0x180
+[1800sub2]
+ParameterName=Transmission type
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue=254
+[1A00]
+ParameterName=TPDO mapping parameter
+ObjectType=0x9
+SubNumber=1
+[1A00sub0]
+ParameterName=Highest sub-index supported
+ObjectType=0x7
+DataType=0x0005
+AccessType=rw
+DefaultValue=0xFF
 [6000]
 ParameterName=Read input 8-bit
 ObjectType=0x8
@@ -155,8 +189,11 @@ class Names(dict):
         pathlib.Path("sensor.eds").write_text(SENSOR, encoding="utf-8")
         world = ferrodrive.World()
         sensor = world.add(eds="sensor.eds", node=7)
-        world.add_probe()
+        probe = world.add_probe()
         world.run_for(3)
+        # Start remote node (CiA 301, 7.2.8.3.1.1): an operational one sends PDOs.
+        world.send(probe, (0x000, False, False, 2, bytes([1, 7])))
+        world.run_for(0.1)
         return sensor
 
     def make_network(self):

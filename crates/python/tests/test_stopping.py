@@ -1,9 +1,11 @@
 """Whatever a program forgets, or however it ends: what it has set in motion stops, and the bus is silent after it."""
 
 import asyncio
+import math
 import pathlib
 import subprocess
 import sys
+import tempfile
 
 import ferrodrive
 import pytest
@@ -23,12 +25,27 @@ def velocity(network, model):
     return drive
 
 
-def group(network, model):
+def opened_group(network, model):
     mode = "ip" if model.startswith("m") else "pv"
     axes = [ferrodrive.Axis(node, model, mode=mode, velocity_rpm=60, acceleration_rpm_s=300) for node in (1, 2)]
-    opened = network.group(axes, period=0.01)
+    return network.group(axes, period=0.01)
+
+
+def group(network, model):
+    opened = opened_group(network, model)
     # Nothing waits for this.
     opened.moving = opened._native.move_to([36000, 36000], None)
+    return opened
+
+
+def recorded_path(network, model):
+    opened = opened_group(network, model)
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "path.csv"
+        # A minute back and forth each 4 s, at most 45 r/min and 71 (r/min)/s.
+        rows = [(time, 172 * (1 - math.cos(math.tau * time / 4))) for time in (row / 20 for row in range(1201))]
+        path.write_text("t_s,1.angle_deg,2.angle_deg\n" + "".join(f"{time},{angle},{angle}\n" for time, angle in rows))
+        opened.moving = opened._native.follow_file(str(path), False, True)
     return opened
 
 
@@ -85,7 +102,7 @@ def begin(motion, network, world, model):
     return opened
 
 
-@pytest.mark.parametrize("motion", [velocity, group, base])
+@pytest.mark.parametrize("motion", [velocity, group, recorded_path, base])
 @pytest.mark.parametrize("error", [None, KeyboardInterrupt])
 def test_a_network_that_is_left_stops_what_it_moved_and_is_silent(world, model, motion, error):
     opened = None
@@ -118,7 +135,7 @@ def test_a_group_or_base_that_nobody_holds_any_more_stops(world, model, motion):
         assert_stands(world)
 
 
-@pytest.mark.parametrize("motion", [velocity, group, base])
+@pytest.mark.parametrize("motion", [velocity, group, recorded_path, base])
 def test_a_network_that_nobody_holds_any_more_stops_what_it_moved(world, model, motion):
     network = ferrodrive.Network(world)
     opened = begin(motion, network, world, model)
@@ -328,12 +345,23 @@ def test_an_interrupted_close_goes_on_and_the_next_one_waits_for_it(monkeypatch,
             wheels.base.command(0.1, 0.0)
 
 
-def test_an_interrupted_move_of_a_group_comes_to_rest_and_the_group_goes_on(monkeypatch):
+@pytest.mark.parametrize("motion", ["move", "points", "file, on its way", "file, while it is approached"])
+def test_an_interrupted_motion_of_a_group_comes_to_rest_and_the_group_goes_on(monkeypatch, tmp_path, motion):
     axes = OpenedAxes()
+    path = tmp_path / "path.csv"
+    path.write_text("t_s,1.angle_deg,2.angle_deg\n0,0,0\n5,500,500\n10,1000,1000\n")
+    far = [[1000.0 * (1 - math.cos(math.pi * cycle / 5000)) / 2] * 2 for cycle in range(5001)]
+    motions = {
+        "move": lambda: axes.group.move([36000, 36000]),
+        "points": lambda: axes.group.follow(far),
+        "file, on its way": lambda: axes.group.follow_file(path),
+        "file, while it is approached": lambda: (path.write_text("t_s,1.angle_deg\n0,36000\n9,36001\n"), axes.group.follow_file(path, approach=True)),
+    }
     with axes.network:
-        Interrupts(monkeypatch, axes.world, 0.5)
+        Interrupts(monkeypatch, axes.world, 1.5)
         with pytest.raises(KeyboardInterrupt):
-            axes.group.move([36000, 36000])
+            motions[motion]()
+        assert speed_of(axes.world) > 5.0
         axes.network.sleep(1.0)
         assert speed_of(axes.world) < 1.0
         assert axes.group.move([0, 0]) > 0.0

@@ -6,7 +6,7 @@ use core::time::Duration;
 use can::Instant;
 
 use super::error::GroupError;
-use super::limits::PathPoint;
+use super::limits::{AxisLimits, PathPoint};
 use super::runner::{Activity, GroupRunner, POWER_LIMIT};
 use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
@@ -53,6 +53,21 @@ impl Group {
     /// The network that its drives are on.
     pub const fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// The drives of its axes, in their order.
+    pub fn drives(&self) -> &[Drive] {
+        &self.drives
+    }
+
+    /// What its axes may do, in their order.
+    pub fn limits(&self) -> &[AxisLimits] {
+        &self.runner.limits
+    }
+
+    /// The length of its cycle.
+    pub fn period(&self) -> Duration {
+        Duration::from_secs_f64(self.runner.period_s)
     }
 
     /// What the group is doing.

@@ -13,6 +13,7 @@ time passes in it. When one faults, is lost or lags, all come to rest, and the c
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -206,6 +207,26 @@ class Group(_Open):
         """
         self.network._finish(self._native.follow([list(point) for point in points_deg]))
 
+    def follow_file(self, path: Union[str, os.PathLike[str]], *, approach: bool = False, relative: bool = False) -> float:
+        """Along a recorded path (CSV: ``t_s`` and a position of each axis by its node, ``1.angle_deg``; a record or capture with positions is
+        one too), by a cubic spline at rest at both ends. All of its set-points are held to the limits before anything moves; axes that
+        it does not name stay where they are. Waits until they were seen to stand; returns how long the path takes, in s.
+
+        :param approach: leads axes that stand elsewhere to the first point before, by a move within the limits
+        :param relative: the path begins where each axis is held
+        :raises MasterError: kind ``bad_file``, ``out_of_limits`` with the first time at which a limit is broken, ``not_at_start`` with how far
+            each axis is away, and nothing moves; or what stopped the group on its way
+        :raises BadRequest: it has positions of a node that is not of the group
+
+        >>> with open("path.csv", "w") as file:
+        ...     written = file.write("t_s,5.angle_deg\\n0,0\\n0.5,10\\n1,20\\n")
+        >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp", acceleration_rpm_s=300)]) as group:
+        ...     group.follow_file("path.csv", relative=True)
+        1.0
+        """
+        time: float = self.network._finish(self._native.follow_file(os.fspath(path), approach, relative))
+        return time
+
     def state(self) -> GroupState:
         """What the last cycle showed.
 
@@ -333,6 +354,11 @@ class AsyncGroup(_AsyncOpen):
     async def follow(self, points_deg: Sequence[Sequence[float]]) -> None:
         """As :meth:`Group.follow`."""
         await self.network._finish_soon(self._native.follow([list(point) for point in points_deg]))
+
+    async def follow_file(self, path: Union[str, os.PathLike[str]], *, approach: bool = False, relative: bool = False) -> float:
+        """As :meth:`Group.follow_file`."""
+        time: float = await self.network._finish_soon(self._native.follow_file(os.fspath(path), approach, relative))
+        return time
 
     def state(self) -> GroupState:
         """As :meth:`Group.state`, which waits for nothing."""
