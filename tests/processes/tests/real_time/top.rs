@@ -53,6 +53,25 @@ impl Terminal {
         Some(Self { script, keys, screen, _cache: cache })
     }
 
+    /// The program itself, which is the one child of `script`.
+    fn program(&self) -> u32 {
+        let script = self.script.id();
+        wait_for("the program", || {
+            let children = std::fs::read_to_string(format!("/proc/{script}/task/{script}/children"));
+            let first = children.map_err(|error| error.to_string())?;
+            first.split_whitespace().next().and_then(|pid| pid.parse().ok()).ok_or_else(|| "none".to_owned())
+        })
+    }
+
+    /// Continues the program: `script` stands still with it.
+    fn go_on(&self, pid: u32) {
+        wait_until("it goes on", || {
+            signal("CONT", self.script.id());
+            signal("CONT", pid);
+            !is_stopped(pid)
+        });
+    }
+
     fn press(&mut self, key: &str) {
         self.keys.write_all(key.as_bytes()).unwrap();
         self.keys.flush().unwrap();
@@ -169,4 +188,51 @@ fn a_terminal_that_is_lost_stops_what_it_moves() {
     // The window closes: its processes are hung up.
     drop(terminal);
     wait_until_it_stands(&mut simulator);
+}
+
+/// By what others send it, and by Ctrl-Z: the shell has its terminal as it was, and nothing moves that the program, which stands still,
+/// could not stop. Then it goes on where it was.
+#[test]
+fn a_suspended_program_leaves_a_terminal_that_can_be_used_and_a_drive_at_rest() {
+    let (mut simulator, bus) = bench();
+    let Some(mut terminal) = Terminal::open(&bus) else { return };
+    terminal.wait_for_drive("zlac8030l");
+    let pid = terminal.program();
+    let is_raw = || !stty(pid).contains(" icanon") || !stty(pid).contains(" echo ");
+    assert!(is_raw(), "keys come one by one");
+    let before = position(&mut simulator);
+    terminal.hold_until("l", || position(&mut simulator) - before > 200);
+    signal("TSTP", pid);
+    wait_until("it stands still", || is_stopped(pid));
+    assert!(!is_raw(), "{}", stty(pid));
+    wait_until_it_stands(&mut simulator);
+    terminal.go_on(pid);
+    wait_until("it draws again", || is_raw() && terminal.shows("ferrodrive top"));
+    terminal.press("\x1a");
+    wait_until("it stands still", || is_stopped(pid));
+    assert!(!is_raw(), "{}", stty(pid));
+    terminal.go_on(pid);
+    // It moves again, and ends as ever.
+    let before = position(&mut simulator);
+    terminal.hold_until("l", || position(&mut simulator) - before > 200);
+    terminal.press("q");
+    let status = wait_for("q ends it", || terminal.script.try_wait().unwrap().ok_or_else(|| "it runs".to_owned()));
+    assert!(status.success(), "{status}");
+}
+
+fn signal(name: &str, pid: u32) {
+    assert!(Command::new("kill").args([format!("-{name}"), pid.to_string()]).status().unwrap().success());
+}
+
+/// Stopped by a signal, as Linux shows it.
+fn is_stopped(pid: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    status.lines().any(|line| line.starts_with("State:\tT"))
+}
+
+/// How the terminal of a process is set.
+fn stty(pid: u32) -> String {
+    let place = format!("/proc/{pid}/fd/0");
+    let shown = Command::new("stty").args(["-F", &place, "-a"]).output().unwrap();
+    String::from_utf8_lossy(&shown.stdout).into_owned()
 }

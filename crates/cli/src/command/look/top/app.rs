@@ -9,7 +9,7 @@ use host::{News, NodeView, SessionId, Snapshot};
 use serde_json::{Value, json};
 
 use super::hold::{Act, Hold};
-use super::samples::Past;
+use super::samples::{Past, Plotted};
 
 /// Columns and lines in which everything fits.
 pub(super) const LEAST: (u16, u16) = (80, 24);
@@ -20,8 +20,11 @@ const JOG_RPM: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0
 /// The one that is chosen at the start: slow.
 const FIRST_JOG: usize = 3;
 
-/// News that are kept.
-const MOST_NEWS: usize = 50;
+/// News that are kept, to be read back.
+const MOST_NEWS: usize = 500;
+
+/// How far a page key goes back in the news, lines.
+const PAGE: usize = 10;
 
 /// What is shown and chosen.
 #[derive(Debug)]
@@ -34,6 +37,12 @@ pub(super) struct App {
     pub(super) news: Vec<News>,
     pub(super) chosen: Option<u8>,
     pub(super) help: bool,
+    /// How many lines before the last one the news are read, where they are over everything.
+    pub(super) read_back: Option<usize>,
+    /// What of an object's name has been typed.
+    pub(super) typed: Option<String>,
+    /// The object that is plotted beside what is always.
+    pub(super) object: Option<Plotted>,
     /// The node that was not moved, since nothing stops it when this program dies: whether it is to be moved nevertheless.
     pub(super) question: Option<u8>,
     /// Neither what a key would move nor what is asked before that can be seen.
@@ -51,6 +60,8 @@ pub(super) struct App {
 pub(super) enum Action {
     /// To be said to the host.
     Say(Value),
+    /// What was moved from here stops, and the shell has the terminal until it continues this program.
+    Suspend,
     /// The end.
     Quit,
 }
@@ -64,6 +75,9 @@ impl App {
             news: Vec::new(),
             chosen: None,
             help: false,
+            read_back: None,
+            typed: None,
+            object: None,
             question: None,
             is_too_small: false,
             jog_step: FIRST_JOG,
@@ -76,6 +90,9 @@ impl App {
     /// The host has shown something newer.
     pub(super) fn take(&mut self, state: Arc<Snapshot>) {
         self.past.note(&state);
+        if self.object.as_ref().is_some_and(|object| state.node(object.node).is_none()) {
+            self.object = None;
+        }
         self.state = state;
         let is_there = self.chosen.is_some_and(|node| self.state.node(node).is_some());
         if !is_there {
@@ -152,6 +169,8 @@ impl App {
     /// A key.
     pub(super) fn key(&mut self, key: KeyEvent, now: Instant) -> Vec<Action> {
         let side = match key.code {
+            // A letter of a name.
+            _ if self.typed.is_some() => None,
             KeyCode::Left | KeyCode::Char('h') => Some(-1.0),
             KeyCode::Right | KeyCode::Char('l') => Some(1.0),
             _ => None,
@@ -162,13 +181,13 @@ impl App {
         }
         if self.is_too_small {
             return match key.code {
-                KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key),
+                KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key, now),
                 _ => Vec::new(),
             };
         }
         if let Some(node) = self.question {
             let given_up = self.hold.give_up(now);
-            return [self.jog(given_up), self.answer(node, key)].concat();
+            return [self.jog(given_up), self.answer(node, key, now)].concat();
         }
         let mut actions = Vec::new();
         // Any other key lets go of what was held.
@@ -181,18 +200,18 @@ impl App {
         }
         if let Some(side) = side {
             self.side = side;
-            if !self.help {
+            if !self.help && self.read_back.is_none() {
                 let act = self.hold.press(now);
                 actions.extend(self.jog(act));
             }
             return actions;
         }
-        actions.extend(self.other_key(key));
+        actions.extend(self.other_key(key, now));
         actions
     }
 
     /// A key while the question is on the screen.
-    fn answer(&mut self, node: u8, key: KeyEvent) -> Vec<Action> {
+    fn answer(&mut self, node: u8, key: KeyEvent, now: Instant) -> Vec<Action> {
         // The key that led to it may still be held.
         if matches!(key.code, KeyCode::Left | KeyCode::Right | KeyCode::Char('h' | 'l')) {
             return Vec::new();
@@ -200,18 +219,32 @@ impl App {
         self.question = None;
         match key.code {
             KeyCode::Char('y') => vec![Action::Say(json!({ "do": "accept_unguarded", "node": node }))],
-            KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key),
+            KeyCode::Esc | KeyCode::Char(' ' | 'q' | 'c') => self.other_key(key, now),
             _ => Vec::new(),
         }
     }
 
-    fn other_key(&mut self, key: KeyEvent) -> Vec<Action> {
+    fn other_key(&mut self, key: KeyEvent, now: Instant) -> Vec<Action> {
         let control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
             // What stops comes first, whatever is on the screen.
-            KeyCode::Esc | KeyCode::Char(' ') => vec![Action::Say(json!({ "do": "stop_all" }))],
+            KeyCode::Esc | KeyCode::Char(' ') => {
+                self.typed = None;
+                vec![Action::Say(json!({ "do": "stop_all" }))]
+            }
             KeyCode::Char('c') if control => vec![Action::Quit],
+            KeyCode::Char('z') if control => self.suspend(now),
+            _ if self.typed.is_some() => self.type_on(key),
             KeyCode::Char('q') => vec![Action::Quit],
+            _ if self.read_back.is_some() => self.turn_page(key),
+            KeyCode::Char('w') => {
+                self.read_back = Some(0);
+                Vec::new()
+            }
+            KeyCode::Char('o') => {
+                self.typed = Some(String::new());
+                Vec::new()
+            }
             KeyCode::Char('?') => {
                 self.help = !self.help;
                 Vec::new()
@@ -241,7 +274,59 @@ impl App {
     /// Time has passed.
     pub(super) fn look(&mut self, now: Instant) -> Vec<Action> {
         let act = self.hold.look(now);
-        self.jog(act)
+        let mut actions = self.jog(act);
+        actions.extend(self.object.as_mut().and_then(|object| object.ask(now)).map(Action::Say));
+        actions
+    }
+
+    /// The shell is to have the terminal.
+    pub(super) fn suspend(&mut self, now: Instant) -> Vec<Action> {
+        let mut actions = self.lose_focus(now);
+        actions.push(Action::Suspend);
+        actions
+    }
+
+    /// A key while the name of an object is typed.
+    fn type_on(&mut self, key: KeyEvent) -> Vec<Action> {
+        let Some(typed) = &mut self.typed else { return Vec::new() };
+        match key.code {
+            KeyCode::Char(letter) => typed.push(letter),
+            KeyCode::Backspace => drop(typed.pop()),
+            KeyCode::Enter => {
+                let name = std::mem::take(typed);
+                self.typed = None;
+                self.object = self.chosen.filter(|_| !name.is_empty()).map(|node| Plotted::new(node, name));
+            }
+            _ => self.typed = None,
+        }
+        Vec::new()
+    }
+
+    /// A key while the news are read back.
+    fn turn_page(&mut self, key: KeyEvent) -> Vec<Action> {
+        let at = self.read_back.unwrap_or(0);
+        let most = self.news.len().saturating_sub(1);
+        self.read_back = match key.code {
+            KeyCode::Up | KeyCode::Char('k') => Some((at + 1).min(most)),
+            KeyCode::Down | KeyCode::Char('j') => Some(at.saturating_sub(1)),
+            KeyCode::PageUp => Some((at + PAGE).min(most)),
+            KeyCode::PageDown => Some(at.saturating_sub(PAGE)),
+            KeyCode::Home => Some(most),
+            KeyCode::End => Some(0),
+            _ => None,
+        };
+        Vec::new()
+    }
+
+    /// What became of a reading of an object; another one may be plotted by now.
+    pub(super) fn object_read(&mut self, node: Option<u64>, name: &str, answer: &Value, now: Instant) {
+        let is_plotted = |object: &&mut Plotted| node == Some(object.node.into()) && object.name == name;
+        let Some(object) = self.object.as_mut().filter(is_plotted) else { return };
+        if let Err(why) = object.take(answer, (now, self.state.time_s)) {
+            let (node, name) = (object.node, object.name.clone());
+            self.object = None;
+            self.report(Some(node), format!("{name} is not plotted: {why}"));
+        }
     }
 
     /// The terminal has this size.

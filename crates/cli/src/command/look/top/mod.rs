@@ -7,6 +7,7 @@ mod app;
 mod hold;
 mod samples;
 mod screen;
+mod suspend;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +34,7 @@ use crate::failure::Failure;
 use crate::output::Format;
 use crate::recording::{HostViewers, ViewerOptions};
 use app::{Action, App};
+use samples::READING;
 use screen::Look;
 
 /// Show and move drives in this terminal: states, plots, faults, keys to jog and stop
@@ -103,14 +105,31 @@ struct Screen {
 }
 
 impl Screen {
-    fn take() -> std::io::Result<Self> {
+    /// Whether it tells releases is asked for where that is not known: not beside a thread that waits for keys, which would hear the
+    /// answer.
+    fn take(tells_releases: Option<bool>) -> std::io::Result<Self> {
         let terminal = ratatui::try_init()?;
-        let tells_releases = terminal::supports_keyboard_enhancement().unwrap_or(false);
+        let tells_releases =
+            tells_releases.unwrap_or_else(|| terminal::supports_keyboard_enhancement().unwrap_or(false));
         let _ = execute!(stdout(), EnableFocusChange);
         if tells_releases {
             let _ = execute!(stdout(), PushKeyboardEnhancementFlags(KeyboardEnhancementFlags::REPORT_EVENT_TYPES));
         }
         Ok(Self { terminal, tells_releases })
+    }
+}
+
+impl Screen {
+    /// What was moved from here stops, and the process stands still, its terminal as it was, until the shell continues it.
+    async fn left_to_the_shell(self, context: &Context) -> std::io::Result<Self> {
+        let stopped = stop(context).await;
+        let tells_releases = self.tells_releases;
+        drop(self);
+        if let Err(failure) = stopped {
+            context.note(&failure.to_string());
+        }
+        suspend::suspend();
+        Self::take(Some(tells_releases))
     }
 }
 
@@ -143,23 +162,29 @@ fn listen() -> mpsc::Receiver<Event> {
     receiver
 }
 
+/// What is awaited: the node that it is about, the object if it is a reading of one, and the answer.
+type Answers = JoinSet<(Option<u64>, Option<String>, Value)>;
+
+fn say(client: &mut LocalClient, answers: &mut Answers, message: Value) {
+    let node = message["node"].as_u64();
+    let object = message["objects"][0].as_str().filter(|_| message["do"] == READING).map(str::to_owned);
+    let answer = client.say(message);
+    answers.spawn(async move { (node, object, answer.await) });
+}
+
 async fn show(context: &Context, host: host::HostHandle, format: Format) -> Result<(), Failure> {
     let gone = || Failure::new("the host of the drives has ended");
     let mut client = LocalClient::take(&host).await.ok_or_else(gone)?;
     let cannot = |error: std::io::Error| Failure::new("cannot draw on this terminal").because(error);
-    let mut screen = Screen::take().map_err(cannot)?;
+    let mut screen = Screen::take(None).map_err(cannot)?;
     let look = Look { colour: format.paint.is_on() };
     let mut events = listen();
     let mut app = App::new(client.id());
     let size = screen.terminal.size().map_err(cannot)?;
     app.resize(size.width, size.height, context.network.now());
-    let mut answers = JoinSet::new();
-    let say = |client: &mut LocalClient, answers: &mut JoinSet<(Option<u64>, Value)>, message: Value| {
-        let node = message["node"].as_u64();
-        let answer = client.say(message);
-        answers.spawn(async move { (node, answer.await) });
-    };
+    let mut answers = Answers::new();
     say(&mut client, &mut answers, serde_json::json!({ "do": "take_control" }));
+    let mut suspensions = suspend::Suspensions::listen();
     let (mut tick, mut alive) = (tokio::time::interval(TICK), tokio::time::interval(ALIVE));
     let mut is_new = true;
     loop {
@@ -193,15 +218,25 @@ async fn show(context: &Context, host: host::HostHandle, format: Format) -> Resu
                 }
                 Vec::new()
             }
-            Some(Ok((node, answer))) = answers.join_next() => {
-                is_new |= app.answered(node, &answer);
+            Some(Ok((node, object, answer))) = answers.join_next() => {
+                match object {
+                    Some(object) => app.object_read(node, &object, &answer, context.network.now()),
+                    None => is_new |= app.answered(node, &answer),
+                }
                 Vec::new()
             }
+            () = suspensions.next() => app.suspend(now),
         };
         for action in actions {
             match action {
                 Action::Quit => return Ok(()),
                 Action::Say(message) => say(&mut client, &mut answers, message),
+                Action::Suspend => {
+                    screen = screen.left_to_the_shell(context).await.map_err(cannot)?;
+                    let size = screen.terminal.size().map_err(cannot)?;
+                    app.resize(size.width, size.height, context.network.now());
+                    is_new = true;
+                }
             }
         }
     }

@@ -1,8 +1,11 @@
 //! The last minute of what each drive measures, for the plots.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
 
+use can::Instant;
 use host::Snapshot;
+use serde_json::{Value, json};
 
 /// How much of the past is kept, s.
 pub(super) const SPAN_S: f64 = 60.0;
@@ -45,6 +48,64 @@ impl Past {
         samples.into_iter().flatten().map(|(at, value)| (at - now_s, *value)).collect()
     }
 }
+
+/// An object of choice, read by SDO.
+#[derive(Clone, Debug)]
+pub(super) struct Plotted {
+    pub(super) node: u8,
+    /// As it was typed.
+    pub(super) name: String,
+    /// When it is read again; `None` while an answer is awaited.
+    next: Option<Instant>,
+    samples: Samples,
+}
+
+/// How often it is read: as often as the host looks at a drive.
+const EVERY: Duration = Duration::from_millis(50);
+
+impl Plotted {
+    pub(super) fn new(node: u8, name: String) -> Self {
+        Self { node, name, next: Some(Instant::ZERO), samples: Samples::new() }
+    }
+
+    /// The message that reads it, when it is time for that.
+    pub(super) fn ask(&mut self, now: Instant) -> Option<Value> {
+        self.next.take_if(|next| *next <= now)?;
+        Some(json!({ "do": READING, "node": self.node, "objects": [self.name] }))
+    }
+
+    /// The answer to that, which came at this time.
+    ///
+    /// # Errors
+    /// Why there is nothing to plot.
+    pub(super) fn take(&mut self, answer: &Value, (now, time_s): (Instant, f64)) -> Result<(), String> {
+        self.next = Some(now + EVERY);
+        if let Some(error) = answer["error"]["message"].as_str() {
+            return Err(error.to_owned());
+        }
+        let value = &answer["result"]["values"][0];
+        if let Some(refused) = value["refused"].as_str() {
+            return Err(refused.to_owned());
+        }
+        // A value and its unit or meaning.
+        let text = value["text"].as_str().unwrap_or_default();
+        let number = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
+        let number = number.ok_or_else(|| format!("'{text}' is not a number"))?;
+        self.samples.push_back((time_s, number));
+        while self.samples.front().is_some_and(|(at, _)| *at < time_s - SPAN_S) {
+            self.samples.pop_front();
+        }
+        Ok(())
+    }
+
+    /// Its values, with times before `now_s`.
+    pub(super) fn values(&self, now_s: f64) -> Vec<(f64, f64)> {
+        self.samples.iter().map(|(at, value)| (at - now_s, *value)).collect()
+    }
+}
+
+/// What reads objects, as a word of a message.
+pub(super) const READING: &str = "read_objects";
 
 /// The axis that shows these values: round bounds that all are within, never narrower than a tenth.
 pub(super) fn bounds(values: &[(f64, f64)]) -> [f64; 2] {

@@ -1,7 +1,7 @@
 //! The picture: nodes, plots of the chosen one, what it has to say, what has happened, keys. Made for 80 columns and 24 lines; more
 //! room goes to the plots. Nothing is shown by colour alone.
 
-use host::{NodeView, Snapshot};
+use host::{News, NodeView, Snapshot};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -20,7 +20,7 @@ const NEWS: u16 = 3;
 
 const KEYS: &str = "e enable  d disable  left/right jog  s stop  r reset  SPACE stop  ? help  q quit";
 
-const HELP: [&str; 17] = [
+const HELP: [&str; 20] = [
     "SPACE, Esc       quick stop of every drive",
     "left, right      jog the chosen drive while held (also h and l). It",
     "                 begins with the second repeat of the key and ends 0.2 s",
@@ -34,7 +34,10 @@ const HELP: [&str; 17] = [
     "x                explain why it does not move",
     "n                scan the bus",
     "t                take control, if no other session has it",
+    "w                what has happened, read back",
+    "o                plot an object of the chosen node, by name or number",
     "q, Ctrl-C        quit: what was moved from here stops",
+    "Ctrl-Z           stop that too, and back to the shell until fg",
     "",
     "What this terminal moves stops too when it closes, when its connection",
     "is lost or when this program ends.",
@@ -78,6 +81,12 @@ pub(super) fn draw(frame: &mut Frame<'_>, app: &App, look: Look) {
     frame.render_widget(chosen_lines(app, look), chosen);
     draw_news(frame, news, app);
     frame.render_widget(Line::from(KEYS).style(Style::new().add_modifier(Modifier::DIM)), keys);
+    if let Some(back) = app.read_back {
+        draw_past(frame, area, app, back);
+    }
+    if let Some(typed) = &app.typed {
+        draw_typed(frame, area, typed);
+    }
     if app.help {
         draw_help(frame, area);
     }
@@ -102,6 +111,12 @@ fn title_line<'a>(app: &'a App, look: Look) -> Line<'a> {
         Span::from("ferrodrive top").style(Style::new().add_modifier(Modifier::BOLD)),
         Span::from(format!("  {}{rate}{load}  {} frames/s", bus.name, bus.frames_per_s)),
     ];
+    let nodes = app.state.nodes.len();
+    if nodes > usize::from(MOST_NODES) {
+        let faulted = app.state.nodes.iter().filter(|node| is_faulted(node)).count();
+        let faults = if faulted > 0 { format!(", {faulted} faulted") } else { String::new() };
+        line.push(Span::from(format!("  {nodes} nodes{faults}")));
+    }
     if *scanning {
         line.push(Span::from("  scanning"));
     }
@@ -130,13 +145,17 @@ fn draw_nodes(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
     frame.render_widget(Paragraph::new(lines), area);
 }
 
+fn is_faulted(node: &NodeView) -> bool {
+    node.drive.as_ref().and_then(|drive| drive.fault_code).is_some_and(|code| code != 0)
+}
+
 fn node_line(node: &NodeView, is_chosen: bool, look: Look) -> Line<'static> {
     let drive = node.drive.as_ref();
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
     };
     let fault = drive.and_then(|drive| drive.fault_code).filter(|code| *code != 0);
-    let faulted = fault.is_some();
+    let faulted = is_faulted(node);
     let state = match (drive, fault, &node.trouble) {
         (_, _, Some(_)) => "no answer".to_owned(),
         (_, Some(code), _) => format!("! fault {code:04X}h"),
@@ -173,21 +192,26 @@ fn fitted(text: &str, width: usize) -> String {
 
 fn draw_plots(frame: &mut Frame<'_>, area: Rect, app: &App, look: Look) {
     let Some(node) = app.chosen else { return };
-    let areas = Layout::horizontal([Constraint::Ratio(1, 3); 3]).spacing(1).areas::<3>(area);
-    for (signal, area) in areas.into_iter().enumerate() {
-        let values = app.past.of(node, signal, app.state.time_s);
+    let now_s = app.state.time_s;
+    let always =
+        SIGNALS.iter().enumerate().map(|(at, signal)| (format!("{signal} of {node}"), app.past.of(node, at, now_s)));
+    let object = app.object.as_ref();
+    let object = object.map(|object| (format!("{} of {}", object.name, object.node), object.values(now_s)));
+    let plots: Vec<_> = always.chain(object).collect();
+    let areas = Layout::horizontal(plots.iter().map(|_| Constraint::Fill(1))).spacing(1).split(area);
+    let colours = [Color::Cyan, Color::Yellow, Color::Green, Color::Magenta];
+    for (((title, values), area), colour) in plots.into_iter().zip(areas.iter()).zip(colours) {
         let [low, high] = bounds(&values);
         let line = Dataset::default()
             .marker(Marker::Braille)
             .graph_type(GraphType::Line)
-            .style(look.in_colour([Color::Cyan, Color::Yellow, Color::Green][signal]))
+            .style(look.in_colour(colour))
             .data(&values);
-        let title = format!("{} of {node}", SIGNALS[signal]);
         let chart = Chart::new(vec![line])
             .block(Block::new().borders(Borders::TOP).title(title))
             .x_axis(Axis::default().bounds([-SPAN_S, 0.0]).labels(["-60 s", "now"]))
             .y_axis(Axis::default().bounds([low, high]).labels([shown(low), shown(high)]));
-        frame.render_widget(chart, area);
+        frame.render_widget(chart, *area);
     }
 }
 
@@ -228,12 +252,58 @@ fn chosen_lines<'a>(app: &'a App, look: Look) -> Paragraph<'a> {
 
 fn draw_news(frame: &mut Frame<'_>, area: Rect, app: &App) {
     let news = app.news.iter().rev().take(usize::from(NEWS)).rev();
-    let lines = news.map(|news| {
-        let node = news.node.map(|node| format!("node {node}")).filter(|node| !news.text.starts_with(node));
-        let node = node.map_or_else(String::new, |node| format!("{node}: "));
-        Line::from(format!("{:8.1} s  {node}{}", news.time_s, news.text))
-    });
-    frame.render_widget(Paragraph::new(lines.collect::<Vec<_>>()).block(Block::new().borders(Borders::TOP)), area);
+    let lines: Vec<_> = news.map(|news| Line::from(news_text(news))).collect();
+    frame.render_widget(Paragraph::new(lines).block(Block::new().borders(Borders::TOP)), area);
+}
+
+fn news_text(news: &News) -> String {
+    let node = news.node.map(|node| format!("node {node}")).filter(|node| !news.text.starts_with(node));
+    let node = node.map_or_else(String::new, |node| format!("{node}: "));
+    format!("{:8.1} s  {node}{}", news.time_s, news.text)
+}
+
+/// What has happened, in full, up to so many news before the last.
+fn draw_past(frame: &mut Frame<'_>, area: Rect, app: &App, back: usize) {
+    frame.render_widget(Clear, area);
+    let (count, room) = (app.news.len(), usize::from(area.height).saturating_sub(2));
+    let last = count.saturating_sub(back);
+    let width = usize::from(area.width).saturating_sub(2).max(1);
+    let lines: Vec<_> = app.news[..last].iter().flat_map(|news| wrapped(&news_text(news), width)).collect();
+    let shown: Vec<_> =
+        lines[lines.len().saturating_sub(room)..].iter().map(|line| Line::from(line.as_str())).collect();
+    let title = format!(" news up to {last} of {count}; up, down, page keys; any other key goes back ");
+    frame.render_widget(Paragraph::new(shown).block(Block::bordered().title(title)), area);
+}
+
+/// A text in lines of a width; all but the first begin below its words.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    const INDENT: usize = 12;
+    let mut lines = vec![String::new()];
+    let mut at = 0;
+    for word in text.split_inclusive(' ') {
+        let length = word.trim_end().chars().count();
+        if at > INDENT && at + length > width {
+            lines.push(" ".repeat(INDENT));
+            at = INDENT;
+        }
+        at += word.chars().count();
+        if let Some(line) = lines.last_mut() {
+            line.push_str(word);
+        }
+    }
+    lines
+}
+
+/// The name of an object while it is typed.
+fn draw_typed(frame: &mut Frame<'_>, area: Rect, typed: &str) {
+    let width = LEAST.0 - 4;
+    let within = Rect { x: area.x + (area.width - width) / 2, y: area.y + area.height / 2 - 2, width, height: 4 };
+    frame.render_widget(Clear, within);
+    let text = vec![
+        Line::from(format!("object to plot: {typed}_")),
+        Line::from("e.g. 60F4 or following_error; Enter plots it, Enter alone plots none"),
+    ];
+    frame.render_widget(Paragraph::new(text).block(Block::bordered()), within);
 }
 
 /// Lines of the question: what a drive does without this program is shown in full.

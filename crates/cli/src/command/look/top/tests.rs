@@ -353,6 +353,92 @@ fn answers_are_shown_where_they_say_something() {
     assert!(app.news.last().is_some_and(|news| news.text.contains("nothing is found")));
 }
 
+/// All that has happened, of which three lines are shown otherwise, and in full.
+#[test]
+fn what_has_happened_is_read_back_in_full() {
+    let mut app = app();
+    let long = "the drive stands because it is commanded to. Write 60FFh:00, by SDO or by the first RPDO, and see whether it comes";
+    app.note(News { time_s: 0.5, node: Some(4), text: long.into() });
+    for number in 1..=100 {
+        app.note(News { time_s: f64::from(number), node: None, text: format!("number {number}") });
+    }
+    let has = |app: &App, text: &str| drawn(app, 80, 24).iter().any(|line| line.contains(text));
+    assert!(has(&app, "number 100") && !has(&app, "number 97"));
+    app.key(key(KeyCode::Char('w')), at(0));
+    // 24 lines without the border.
+    assert!(has(&app, "number 79") && !has(&app, "number 78") && has(&app, "news up to 101 of 101"));
+    app.key(key(KeyCode::PageUp), at(0));
+    app.key(key(KeyCode::Up), at(0));
+    assert!(has(&app, "number 89") && !has(&app, "number 90") && has(&app, "number 68"), "{:#?}", drawn(&app, 80, 24));
+    app.key(key(KeyCode::Home), at(0));
+    let shown: String =
+        drawn(&app, 80, 24)[1..].iter().map(|line| line.trim_matches('│').trim().to_owned() + " ").collect();
+    assert!(shown.contains(long), "{shown}");
+    // A held key moves nothing that is not seen, and stop stops.
+    assert_eq!([0, 500, 533].map(|ms| app.key(key(KeyCode::Left), at(ms))).concat(), []);
+    assert_eq!(app.key(key(KeyCode::Char(' ')), at(600)), [say(json!({ "do": "stop_all" }))]);
+    app.key(key(KeyCode::Char('e')), at(700));
+    assert!(app.read_back.is_none() && has(&app, "number 100"));
+}
+
+/// By its name as it is typed, `h` and `l` too, which jog otherwise.
+#[test]
+fn an_object_of_choice_is_read_and_plotted_until_another_is_chosen() {
+    let mut app = app();
+    let typed = |app: &mut App, name: &str| {
+        app.key(key(KeyCode::Char('o')), at(0));
+        for letter in name.chars() {
+            assert_eq!(app.key(key(KeyCode::Char(letter)), at(0)), [], "{letter}");
+        }
+        assert!(drawn(app, 80, 24).iter().any(|line| line.contains(&format!("object to plot: {name}_"))));
+        app.key(key(KeyCode::Enter), at(0));
+    };
+    typed(&mut app, "vl_targex");
+    app.object = None;
+    typed(&mut app, "60F4");
+    let reads = say(json!({ "do": "read_objects", "node": 1, "objects": ["60F4"] }));
+    assert_eq!((app.look(at(10)), app.look(at(20))), (vec![reads.clone()], vec![]), "one at a time");
+    let answer = |text: &str| json!({ "ok": true, "result": { "values": [{ "object": "60F4h:00", "text": text }] } });
+    app.object_read(Some(1), "6064", &answer("7"), at(25));
+    app.object_read(Some(4), "60F4", &answer("7"), at(25));
+    assert!(app.object.as_ref().is_some_and(|object| object.values(0.0).is_empty()), "of another one");
+    app.object_read(Some(1), "60F4", &answer("-250"), at(30));
+    assert_eq!((app.look(at(79)), app.look(at(80))), (vec![], vec![reads]));
+    app.object_read(Some(1), "60F4", &answer("250 (0.7 deg)"), at(90));
+    let lines = drawn(&app, 120, 40);
+    let plot = lines.iter().find(|line| line.contains("60F4 of 1")).expect("its title");
+    assert!(plot.contains("speed r/min of 1") && lines.iter().any(|line| line.contains("-300")), "{lines:#?}");
+    // Neither a number nor an answer: it ends, and why is shown.
+    app.object_read(Some(1), "60F4", &answer("profile velocity"), at(100));
+    assert!(app.object.is_none() && app.news.last().is_some_and(|news| news.text.contains("is not a number")));
+    typed(&mut app, "7000");
+    app.object_read(
+        Some(1),
+        "7000",
+        &json!({ "ok": false, "error": { "kind": "x", "message": "there is none" } }),
+        at(110),
+    );
+    assert!(app.object.is_none() && app.news.last().is_some_and(|news| news.text.contains("there is none")));
+    // Stop stops while it is typed, and Enter alone plots none.
+    app.key(key(KeyCode::Char('o')), at(0));
+    assert_eq!(app.key(key(KeyCode::Char(' ')), at(0)), [say(json!({ "do": "stop_all" }))]);
+    assert!(app.typed.is_none());
+    typed(&mut app, "6041");
+    typed(&mut app, "");
+    assert!(app.object.is_none() && app.look(at(200)).is_empty());
+}
+
+#[test]
+fn more_nodes_than_lines_are_counted_and_a_request_for_the_shell_is_one() {
+    let mut app = app();
+    let mut many = state();
+    many.nodes.extend((20..=36).map(|node| NodeView { node, ..NodeView::default() }));
+    app.take(many.into());
+    assert!(drawn(&app, 120, 40)[0].ends_with("  20 nodes, 1 faulted"), "{}", drawn(&app, 120, 40)[0]);
+    let suspend = KeyEvent::new(KeyCode::Char('z'), KeyModifiers::CONTROL);
+    assert_eq!(app.key(suspend, at(0)), [Action::Suspend]);
+}
+
 fn key(code: KeyCode) -> KeyEvent {
     KeyEvent::new(code, KeyModifiers::NONE)
 }
