@@ -15,8 +15,8 @@ pub struct Loops {
     pub speed_integral: Integral,
     /// Time constant of the filter of the measured speed, in s, where it has an object.
     pub speed_filter: Option<Quantity>,
-    /// Gain of the position loop, in 1/s.
-    pub position_proportional: Quantity,
+    /// Gain of the position loop, in 1/s, where it is known which object has it.
+    pub position_proportional: Option<Quantity>,
     /// Gain of the current loop, in V/A, and its integral gain, in V/(A s), where they have objects.
     pub current: Option<(Quantity, Quantity)>,
     /// Objects, and the values with which a set-point of speed takes effect at once.
@@ -29,6 +29,12 @@ pub struct Loops {
     pub gain_step: i64,
     /// A speed of the motor at which it can be measured, r/min.
     pub usual_rpm: f64,
+    /// What its speed loop may ask for meanwhile, A.
+    pub usual_a: f64,
+    /// Torque per ampere of the demand, N m/A, where no motor of the model's own says it.
+    pub torque_constant_nm_a: Option<f64>,
+    /// Rated torque in mN m and rated current in mA (CiA 402-2, 6076h and 6075h), where the demand counts by them.
+    pub rated: Option<[Mux; 2]>,
 }
 
 /// A speed loop that cannot be measured from outside, as it is known.

@@ -46,6 +46,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(master::capture::capture, module)?)?;
     module.add_function(wrap_pyfunction!(master::test_motion::test_motion, module)?)?;
     module.add_function(wrap_pyfunction!(master::tune::tune_drive, module)?)?;
+    module.add_function(wrap_pyfunction!(master::tune::tune_ramps_of, module)?)?;
     module.add_function(wrap_pyfunction!(master::report::report, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_backup, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_compare, module)?)?;

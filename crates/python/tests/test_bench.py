@@ -178,3 +178,31 @@ def test_a_joint_is_tuned_by_what_its_twin_shows():
     assert found["inertia_kg_m2"] == pytest.approx(0.69e-4 + (0.15 + 7e-5) / 2500, rel=0.05)
     assert [gain["object"] for gain in found["gains"]] == ["60F9h:01", "60F9h:02", "60FBh:01"]
     assert found["after"]["stable"] and found["position"]["stable"] and found["frequencies"] == 0
+
+
+def test_a_stepper_gets_ramps_with_which_its_twin_loses_no_step():
+    world = ferrodrive.World(bitrate=1_000_000)
+    world.add("zlim42c", node=2)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(2)
+        drive = network.drive(2, "zlim42c")
+        with pytest.raises(ferrodrive.MasterError, match="ramps and currents") as refused:
+            drive.tune()
+        assert refused.value.kind == "no_gains"
+        found = drive.tune_ramps(speed_rpm=600, inertia_kg_m2=3e-5, friction_nm=0.05)
+        assert found["margin_after"] >= 1.5 and found["pull_out_nm"] > 1.5 * found["needed_nm"]
+        # With the load, and with one as many times as large as the margin.
+        assert [row["lost_steps"] for row in found["twin"][:2]] == [0, 0] and not found["applied"]
+        applied = drive.tune_ramps(speed_rpm=600, inertia_kg_m2=3e-5, friction_nm=0.05, apply=True)
+        assert applied["applied"] and applied["margin_before"] == found["margin_before"]
+        for row in applied["values"]:
+            index, sub_index = row["object"].split("h:")
+            held = network.upload(2, int(index, 16), int(sub_index))
+            assert int.from_bytes(held, "little") == row["after"], row
+        again = drive.tune_ramps(speed_rpm=600, inertia_kg_m2=3e-5, friction_nm=0.05)
+        assert again["margin_before"] == pytest.approx(applied["margin_after"])
+        with pytest.raises(ferrodrive.MasterError, match="the load has that margin up to"):
+            drive.tune_ramps(speed_rpm=1400, inertia_kg_m2=3e-5, friction_nm=0.25)
+        with pytest.raises(ValueError, match="expected a margin from 1 to 10"):
+            drive.tune_ramps(margin=0.5)
+    assert abs(world[2].shaft_angle_rad) < 1e-3

@@ -16,6 +16,13 @@ function numberIn(text, what) {
   return value;
 }
 
+/** How often it is captured, one after the other: as many as a browser keeps; throws for what is not such a number. */
+export function timesIn(text, most) {
+  const times = numberIn(text, "a number of captures");
+  if (!Number.isInteger(times) || times < 1 || times > most) throw new Error(`expected 1 to ${most} captures, got ${text}`);
+  return times;
+}
+
 /** The command of a capture, from what the fields have; throws what is wrong with it. */
 export function orderOf(node, { chosen, more, period_ms, duration_s, trigger, pre_ms, sdo }) {
   const quantities = [...new Set([...chosen, ...namesIn(more)])];

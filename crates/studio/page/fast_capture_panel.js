@@ -2,9 +2,10 @@
 
 import { choice } from "./choice.js";
 import { h, renew, setText, toggle } from "./dom.js";
-import { PERIODS_MS, captureOfAnswer, orderOf, remarkOf, rowsOf } from "./fast_capture.js";
+import { PERIODS_MS, captureOfAnswer, orderOf, remarkOf, rowsOf, timesIn } from "./fast_capture.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
+import { MOST_KEPT } from "./test_motion.js";
 
 const SETTINGS = "fast-capture";
 const USUAL = ["velocity", "target_velocity", "current"];
@@ -23,6 +24,7 @@ export function fastCapturePanel(shared, { taken }) {
   const duration = field("fast-time", "Length in s", String(before.duration_s ?? "2"), { class: "short", inputmode: "decimal" });
   const trigger = field("fast-trigger", "Begin when a quantity passes a value: velocity>10 rising, velocity<10 falling; at once without one", String(before.trigger ?? ""), { size: "18", placeholder: "at once, or velocity>10" });
   const pre = field("fast-pre", "Kept of before the trigger, in ms", String(before.pre_ms ?? "0"), { class: "short", inputmode: "decimal" });
+  const times = field("fast-times", "How often: armed again after each, and each is kept", String(before.times ?? "1"), { class: "short", inputmode: "numeric" });
   const sdo = toggle("fast-sdo", "SDO for the rest", before.sdo === true, store, { title: "Read by SDO what has no room in a TPDO: slower, and at times of its own (--sdo)" });
   const begin = h("button", { type: "button", id: "fast-begin", class: "primary", onclick: capture }, "Capture");
   const end = h("button", { type: "button", id: "fast-end", hidden: true, onclick: endIt }, "End now");
@@ -34,7 +36,7 @@ export function fastCapturePanel(shared, { taken }) {
     h("summary", {}, "Fast capture"),
     h("div", { class: "bar" }, quantities),
     h("div", { class: "bar" }, more, truths),
-    h("div", { class: "bar" }, period, h("label", {}, "for ", duration, " s"), h("label", {}, "from ", trigger), h("label", {}, "with ", pre, " ms before it"), sdo),
+    h("div", { class: "bar" }, period, h("label", {}, "for ", duration, " s"), h("label", {}, "from ", trigger), h("label", {}, "with ", pre, " ms before it"), h("label", {}, times, " times"), sdo),
     h("div", { class: "bar" }, begin, end),
     status,
     had,
@@ -42,11 +44,13 @@ export function fastCapturePanel(shared, { taken }) {
   );
   /** The node that is being captured; null for none. */
   let busy = null;
+  /** It was ended by hand: what is there is kept, and no further one begins. */
+  let ended = false;
   /** The node and model whose quantities are offered, asked for or refused: asked once, and again when the form is opened again. */
   let offered = null;
 
   function store() {
-    keep(SETTINGS, { chosen: [...chosen], more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, sdo: sdo.checked });
+    keep(SETTINGS, { chosen: [...chosen], more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, times: times.value, sdo: sdo.checked });
   }
 
   function addTrue() {
@@ -91,26 +95,40 @@ export function fastCapturePanel(shared, { taken }) {
 
   async function capture() {
     const node = shared.node;
-    let order;
+    let order, count;
     try {
+      count = timesIn(times.value, MOST_KEPT);
       if (!inControl()) throw new Error("Take control first: the drive's TPDOs are mapped for it.");
       order = orderOf(node, { chosen: chosenHere(), more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, sdo: sdo.checked });
     } catch (error) {
       return say(error.message, true);
     }
     work(node);
-    had.replaceChildren();
-    say(order.trigger ? `Node ${node}: armed, waits for ${order.trigger} …` : `Node ${node}: capturing …`);
-    const answer = await ask(order);
+    ended = false;
+    for (let number = 1; number <= count && !ended; number++) {
+      if (!(await captureOnce(order, count > 1 ? `, ${number} of ${count}` : ""))) break;
+    }
     work(null);
-    if (!answer.ok) return say(answer.error.message, true);
+  }
+
+  /** True if there is a capture. */
+  async function captureOnce(order, which) {
+    had.replaceChildren();
+    say(order.trigger ? `Node ${order.node}: armed${which}, waits for ${order.trigger} …` : `Node ${order.node}: capturing${which} …`);
+    const answer = await ask(order);
+    if (!answer.ok) {
+      say(answer.error.message, true);
+      return false;
+    }
     const { result } = answer;
-    say(`Node ${node}: ${remarkOf(result)}`, result.lacks.length > 0);
+    say(`Node ${order.node}${which}: ${remarkOf(result)}`, result.lacks.length > 0);
     had.replaceChildren(h("table", {}, h("thead", {}, h("tr", {}, ...HEAD.map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, ...rowsOf(result).map((row) => h("tr", {}, ...row.map((text) => h("td", {}, text)))))));
     taken(captureOfAnswer(result));
+    return result.lacks.length === 0;
   }
 
   async function endIt() {
+    ended = true;
     const answer = await ask({ do: "end_capture", node: busy });
     if (!answer.ok) say(answer.error.message, true);
   }

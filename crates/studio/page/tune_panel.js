@@ -103,7 +103,10 @@ export function tunePanel(shared, report) {
     if (answer.ok) {
       form = answer.result;
       // That of another model may be far too fast.
-      if (form.finds === "gains") inputs.gains.speed_rpm.input.value = String(form.usual_rpm);
+      if (form.finds === "gains") {
+        inputs.gains.speed_rpm.input.value = String(form.usual_rpm);
+        inputs.gains.current_a.input.value = String(form.usual_a);
+      }
       setText(about, form.finds === "gains" ? "The drive is measured, a twin of it is made, and gains for one wish are tried on the twin. Then the drive can try them." : "A stepper without an encoder has no gains, and shows no lost step. Ramps and currents are computed from its load and tried on its twin; nothing moves.");
     } else {
       if (["no_connection", "no_picture"].includes(answer.error.kind)) offered = null;

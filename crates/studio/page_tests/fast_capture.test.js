@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { captureOfAnswer, namesIn, orderOf, remarkOf, rowsOf } from "../page/fast_capture.js";
+import { captureOfAnswer, namesIn, orderOf, remarkOf, rowsOf, timesIn } from "../page/fast_capture.js";
 
 const fields = (more = {}) => ({ chosen: ["velocity"], more: "", period_ms: "1", duration_s: "2", trigger: "", pre_ms: "0", sdo: false, ...more });
 
@@ -26,6 +26,11 @@ test("what is wrong with a field is said before anything is sent", () => {
   wrong({ duration_s: "-1" }, /expected a time above 0 s/);
   wrong({ duration_s: "Infinity" }, /expected a time in s/);
   wrong({ trigger: "velocity>1", pre_ms: "soon" }, /expected a time before the trigger in ms, got 'soon'/);
+});
+
+test("it is captured as often as a browser keeps captures", () => {
+  assert.deepEqual([timesIn("1", 12), timesIn(" 12 ", 12)], [1, 12]);
+  for (const text of ["0", "13", "1.5", "-1", "", "many"]) assert.throws(() => timesIn(text, 12), /expected/, text);
 });
 
 const answer = (more = {}) => ({

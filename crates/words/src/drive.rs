@@ -42,7 +42,7 @@ impl DriveSpec {
     pub fn order(&self, bitrate: Bitrate) -> Order {
         let Self { node, variant, unconfigured, .. } = *self;
         let fidelity = self.fidelity.unwrap_or_default();
-        Order { node, bitrate, variant, presets: self.presets.clone(), unconfigured, fidelity }
+        Order { node, bitrate, variant, presets: self.presets.clone(), unconfigured, fidelity, speed_worth: None }
     }
 
     /// What was chosen for it.

@@ -128,7 +128,7 @@ const LOOPS: Loops = Loops {
     speed_proportional: Mux::new(0x60F9, 1),
     speed_integral: Integral::Time(Mux::new(0x60F9, 2)),
     speed_filter: None,
-    position_proportional: Quantity::new(0x60FB, 1, 0.02),
+    position_proportional: Some(Quantity::new(0x60FB, 1, 0.02)),
     current: None,
     without_ramps: &[(object::PROFILE_ACCELERATION, NO_RAMP_FROM as i64)],
     period: Duration::from_micros(500),
@@ -141,6 +141,9 @@ const LOOPS: Loops = Loops {
     }),
     gain_step: 10,
     usual_rpm: 600.0,
+    usual_a: 15.0,
+    torque_constant_nm_a: None,
+    rated: None,
 };
 
 const STORAGE: ParameterStorage = ParameterStorage {

@@ -10,6 +10,7 @@ mod drive;
 mod faults;
 mod hardware;
 mod motor;
+mod named_gains;
 mod parameters;
 mod position_range;
 mod protection;
@@ -22,7 +23,7 @@ mod velocity_mode;
 
 pub use drive::ServoDrive;
 pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, PowerStage, Sensors};
-pub use motor::{CONTROL_PERIOD_NS, Motor};
+pub use motor::{CONTROL_PERIOD_NS, Motor, SpeedWorth};
 
 use canopen::object::COMMUNICATION_CYCLE_PERIOD;
 use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
@@ -44,7 +45,12 @@ pub fn acts_on(description: &Description, mux: Mux) -> bool {
             let placed = axis.placement.place(*known);
             mux == placed || (mux.sub_index == 0 && mux.index == placed.index && placed.sub_index > 0)
         };
-        slots::AxisSlots::OBJECTS.iter().any(counts)
+        let is_gain = axis.loops.as_ref().is_some_and(|loops| {
+            let others = [loops.demand, loops.speed_filter, loops.position_proportional].into_iter().flatten();
+            let gains = [loops.speed_proportional, loops.speed_integral.object()];
+            gains.into_iter().chain(others.map(|quantity| quantity.object)).any(|gain| gain == mux)
+        });
+        is_gain || slots::AxisSlots::OBJECTS.iter().any(counts)
     });
     by_axis || mux == COMMUNICATION_CYCLE_PERIOD || node::acts_on(mux)
 }
@@ -97,7 +103,8 @@ const SIZE_OF_DATA_RECORD: (u16, u8) = (0x60C4 % 0x800, 5);
 
 /// Objects of the profile whose content CiA 402-2 leaves to makers: parameters of the loops of torque, velocity and position and of the
 /// power stage, data of motor and drive, and the texts that name these two. As the maker's own objects (2000h to 5FFFh) they are stored
-/// and answered, and no loop of this firmware uses them: the lists with which makers' drives are started write them.
+/// and answered, and no loop of this firmware uses them unless the description names them: the lists with which makers' drives are started
+/// write them.
 pub const fn is_left_to_makers(mux: Mux) -> bool {
     let first_axis = 0x6000 + mux.index % 0x800;
     let is_of_profile = matches!(mux.index, 0x6000..=0x9FFF);

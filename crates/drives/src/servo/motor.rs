@@ -61,6 +61,17 @@ pub struct Motor {
     pub braking_w: f32,
     /// Rated voltage of the bus, V.
     pub bus_v: f32,
+    /// What the velocity loop's gains are worth, where objects have them and that is known.
+    pub speed_worth: Option<SpeedWorth>,
+}
+
+/// What a count of the gains of a velocity loop is worth. Currents are amplitudes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedWorth {
+    /// Of the proportional gain, A/(rad/s).
+    pub proportional: f32,
+    /// Of the integral part: of a gain, A/rad; of a time, s.
+    pub integral: f32,
 }
 
 impl Motor {

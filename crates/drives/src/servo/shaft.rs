@@ -19,6 +19,7 @@ use cyclic::CyclicSetPoints;
 use super::faults::{Faults, no_faults};
 use super::hardware::{AxisActuation, AxisSensors, PowerStage};
 use super::motor::{CONTROL_PERIOD_NS, Motor, SUPERVISION_DIVIDER, SUPERVISION_PERIOD_S};
+use super::named_gains::NamedGains;
 use super::parameters::Parameters;
 use super::read;
 use super::slots::AxisSlots;
@@ -65,6 +66,16 @@ fn braking_share(voltage: f32) -> f32 {
     ((none - voltage) / (none - full)).clamp(0.0, 1.0)
 }
 
+/// The loops as these values have them, or as they are for the motor.
+fn gains_of(
+    named: Option<&NamedGains>,
+    values: &Dictionary<impl Storage>,
+    motor: &Motor,
+    fidelity: Fidelity,
+) -> ServoGains {
+    named.map_or_else(|| motor.gains(fidelity), |named| named.gains(values, motor, fidelity))
+}
+
 /// One axis of the drive.
 #[derive(Clone)]
 pub(super) struct Shaft {
@@ -74,6 +85,8 @@ pub(super) struct Shaft {
     motor: Motor,
     model: ServoModel,
     gains: ServoGains,
+    /// Where the gains are, where that is known.
+    named: Option<NamedGains>,
     parameters: Parameters,
     parameters_changed: bool,
     power: PowerDrive,
@@ -121,6 +134,7 @@ impl Shaft {
         let slots = AxisSlots::of(table, description.placement);
         let parameters = Parameters::of(values, &slots, &motor, ModeOfOperation::NONE);
         let model = motor.model(fidelity);
+        let named = description.loops.as_ref().and_then(|loops| NamedGains::of(loops, table));
         let declared = SupportedModes(read(values, slots.supported_modes, 0) as u32);
         let described = description.modes.iter().fold(SupportedModes::default(), |modes, mode| modes.with(*mode));
         Self {
@@ -128,7 +142,8 @@ impl Shaft {
             modes: if slots.supported_modes.is_some() { declared } else { described },
             motor,
             model,
-            gains: motor.gains(fidelity),
+            gains: gains_of(named.as_ref(), values, &motor, fidelity),
+            named,
             parameters,
             parameters_changed: false,
             power: PowerDrive::new(&[]),
@@ -273,6 +288,7 @@ impl Shaft {
         if self.parameters_changed || of_mode(mode) != of_mode(self.parameters.mode) {
             self.parameters_changed = false;
             self.parameters = Parameters::of(values, &self.slots, &self.motor, mode);
+            self.gains = gains_of(self.named.as_ref(), values, &self.motor, self.model.fidelity);
         }
     }
 
@@ -428,13 +444,14 @@ impl Shaft {
 
     /// Nothing that a period reads or writes differs from `earlier`, which is this axis some periods before.
     pub(super) fn rests_since(&self, earlier: &Self) -> bool {
-        // Each by name, so that no new one is forgotten. The first six follow the values when `parameters_changed`.
+        // Each by name, so that no new one is forgotten. The first seven follow the values when `parameters_changed`.
         let Self {
             slots: _,
             modes: _,
             motor: _,
             model: _,
             gains: _,
+            named: _,
             parameters: _,
             parameters_changed,
             power,

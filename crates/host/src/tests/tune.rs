@@ -85,7 +85,10 @@ fn a_page_has_gains_found_and_tried_and_goes_back_with_one_command() {
         async |stage| {
             let mut page = stage.page().await;
             let form = page.knows(of(WHEEL, TuneCommand::TuneForm {})).await;
-            assert_eq!(form, json!({ "node": 4, "finds": "gains", "usual_rpm": 120.0, "in_cycles": true }));
+            assert_eq!(
+                form,
+                json!({ "node": 4, "finds": "gains", "usual_rpm": 120.0, "usual_a": 15.0, "in_cycles": true })
+            );
             assert_eq!(page.refused(tune(WHEEL, order())).await.0, "not_in_control");
             page.must(SessionCommand::TakeControl {}).await;
             assert_eq!(page.refused(of(WHEEL, TuneCommand::TryGains {})).await.0, "nothing_proposed");

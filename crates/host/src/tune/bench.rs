@@ -6,7 +6,7 @@ use canopen::NodeId;
 use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use cia402::object::POSITION_ACTUAL_VALUE;
 use cia402::{ModeOfOperation, RAD_S_PER_RPM};
-use devices::{Loops, Scale};
+use devices::Loops;
 use master::core::{PdoMap, Signal};
 use master::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest};
 use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
@@ -207,9 +207,6 @@ impl Bench {
             failed(&"no object shows the current that its speed loop asks for, with its sign")
                 .next("feed a capture of another instrument in as a file")
         })?;
-        let Scale::PerCount(current_per_count) = demand.scale else {
-            return Err(failed(&"the current that its speed loop asks for has no fixed unit"));
-        };
         node.configure_cyclic(mode).await.map_err(|error| failed(&error))?;
         // The second TPDO: the first has the statusword.
         let number = PdoNumber::at(1).unwrap_or(PdoNumber::FIRST);
@@ -230,7 +227,7 @@ impl Bench {
             network,
             node: node.clone(),
             drive,
-            current_per_count,
+            current_per_count: node.step_of(demand).await?,
             bounds,
             period,
             excursion,

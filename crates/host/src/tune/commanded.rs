@@ -64,7 +64,7 @@ impl Host {
         }
         let (_, loops) = loops_of(&drive).map_err(|failure| refusal(&failure))?;
         Ok(
-            json!({ "node": node.raw(), "finds": "gains", "usual_rpm": loops.usual_rpm, "in_cycles": loops.demand.is_some() }),
+            json!({ "node": node.raw(), "finds": "gains", "usual_rpm": loops.usual_rpm, "usual_a": loops.usual_a, "in_cycles": loops.demand.is_some() }),
         )
     }
 

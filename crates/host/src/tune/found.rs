@@ -32,7 +32,12 @@ impl Found {
     ///
     /// # Errors
     /// Why nothing can be said of it.
-    pub fn of(measured: &Measurement, setup: &Setup, loops: &Loops, motor: &MotorData) -> Result<Self, Unusable> {
+    pub fn of(
+        measured: &Measurement,
+        setup: &Setup,
+        loops: &Loops,
+        (motor, torque_constant_nm_a): (&MotorData, f64),
+    ) -> Result<Self, Unusable> {
         let response = tune::response(&measured.samples, Some(&measured.excitation))?;
         let value = |quantity: Quantity| match quantity.scale {
             Scale::PerCount(worth) => setup.had(quantity.object).map(|raw| raw as f64 * worth),
@@ -47,7 +52,7 @@ impl Found {
         let current = loops.current.and_then(|(kp, ki)| value(kp).zip(value(ki)));
         let response = current.map_or_else(
             || response.clone(),
-            |(proportional, integral)| response.without(&back_emf(motor, proportional, integral)),
+            |(proportional, integral)| response.without(&back_emf(motor, torque_constant_nm_a, proportional, integral)),
         );
         Ok(Self {
             mechanics: tune::identify(&response)?,
@@ -56,7 +61,7 @@ impl Found {
             response: Some(response),
             own,
             gain_share: measured.gain_share,
-            torque_constant_nm_a: motor.windings.torque_constant_nm_a(),
+            torque_constant_nm_a,
         })
     }
 
@@ -81,10 +86,11 @@ impl Found {
     }
 }
 
-fn back_emf(motor: &MotorData, proportional: f64, integral: f64) -> BackEmf {
+/// Of the model's own motor, or of one with another torque per ampere: both are by the same magnets.
+fn back_emf(motor: &MotorData, torque_constant_nm_a: f64, proportional: f64, integral: f64) -> BackEmf {
     let windings = &motor.windings;
     BackEmf {
-        constant_v_s: windings.back_emf_constant_v_s(),
+        constant_v_s: windings.back_emf_constant_v_s() * torque_constant_nm_a / windings.torque_constant_nm_a(),
         resistance_ohm: windings.resistance_ohm,
         inductance_h: windings.inductance_q_h,
         proportional,

@@ -1,7 +1,7 @@
 //! Gains as values of objects, within what these can hold.
 
 use canopen::Mux;
-use devices::{Description, Integral, Loops, Scale};
+use devices::{Description, Integral, Loops, Quantity, Scale};
 use tune::{Loop, Margins, Objective};
 
 use super::found::Found;
@@ -64,6 +64,11 @@ pub enum Unreachable {
         /// Integral part.
         integral: Mux,
     },
+    /// The gain of the position loop is not known.
+    #[error(
+        "it is not known where the gain of the position loop is: position_proportional of loops in the machine file says it"
+    )]
+    NoPositionGain,
     /// None for the position loop.
     #[error("no gain of the position loop keeps {POSITION_PHASE_DEG} degrees around that speed loop")]
     Position,
@@ -108,8 +113,11 @@ impl Proposed {
             ..*own
         };
         let mut position = None;
-        if with_position && let Scale::PerCount(worth) = loops.position_proportional.scale {
-            let object = loops.position_proportional.object;
+        if with_position {
+            let (object, worth) = match loops.position_proportional {
+                Some(Quantity { object, scale: Scale::PerCount(worth) }) => (object, worth),
+                _ => return Err(Unreachable::NoPositionGain),
+            };
             setup.had(object).ok_or(Unreachable::NoObject(object))?;
             let (late_s, phase_deg) = (loops.period.as_secs_f64(), POSITION_PHASE_DEG);
             let gain = tune::propose_position(&found.plant, &around, phase_deg, highest_hz, late_s);

@@ -66,7 +66,7 @@ impl Rotor {
                 all.viscous_nm_s - self.rotor.viscous_nm_s
             ),
         ];
-        let (mut world, drive) = world_of(self.model, Fidelity::Full, &words)?;
+        let (mut world, drive) = world_of(self.model, (Fidelity::Full, None), &words)?;
         sim::pass_beside(&mut world, BOOT).await;
         let begin = async {
             for (object, value) in &self.values {

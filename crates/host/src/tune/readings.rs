@@ -31,6 +31,10 @@ const REVERSALS: u32 = 6;
 const RAMP_RPM_S: f64 = 6000.0;
 /// Shares of the speed between which it is looked at while it speeds up: what is shown is filtered, and comes late.
 const WINDOW: [f64; 2] = [0.4, 0.85];
+/// To which sides steps go.
+const STEPS: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
+/// A speed that is so near on average has settled.
+const SETTLED_SHARE: f64 = 0.01;
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Currents that a drive shows, A.
@@ -48,6 +52,7 @@ pub struct Currents {
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     at: Instant,
+    turns: f64,
     rpm: f64,
     current_a: f64,
 }
@@ -109,7 +114,7 @@ impl Reader {
         let seen = self.excursion.reached(turns, current_a);
         self.bounds.keep(&seen, current_a, self.drive.node().id())?;
         self.excursion = seen;
-        Ok(Reading { at, rpm, current_a })
+        Ok(Reading { at, turns, rpm, current_a })
     }
 
     /// Looks for this long.
@@ -173,17 +178,40 @@ impl Reader {
         Ok(Currents { steady_a, rising_a: sum_a / count, at_share: shares / count })
     }
 
-    /// A step of the set-point without a ramp, from half of the highest speed to three quarters, or by no more than this.
+    /// Looks until it turns with this speed, and then until the motor passes its zero: another step begins likewise. What a reducer
+    /// does to the speed repeats with the motor's turn, and a loop that is slow to settle would begin nearer to its end.
+    async fn settle(&mut self, rpm: f64) -> Result<(), Failure> {
+        let turn = Duration::from_secs_f64(60.0 / rpm.abs()).max(SETTLING);
+        let until = self.now() + PATIENCE;
+        loop {
+            let readings = self.watch(turn).await?;
+            let mean = readings.iter().map(|reading| reading.rpm).sum::<f64>() / readings.len().max(1) as f64;
+            if (mean - rpm).abs() < SETTLED_SHARE * rpm.abs() || self.now() >= until {
+                break;
+            }
+        }
+        let whole = self.look().await?.turns.floor();
+        while self.look().await?.turns.floor() == whole && self.now() < until + turn {}
+        Ok(())
+    }
+
+    /// Steps of the set-point without a ramp, from half of the highest speed to three quarters, or by no more than this, to either
+    /// side in turns: their mean. A reading comes some ms before or after a step takes effect, which one step alone would be judged by.
     ///
     /// # Errors
     /// See [`measure`](Self::measure).
     pub async fn step_response(&mut self, most_rpm: f64, time: Duration) -> Result<StepResponse, Failure> {
         let from = 0.5 * self.bounds.speed_rpm;
         let to = from + (0.25 * self.bounds.speed_rpm).min(most_rpm);
-        self.reach(from).await?;
-        self.watch(SETTLING).await?;
-        self.turn(to, Some(Ramp::Time(Duration::ZERO))).await?;
-        self.answer((from, to), time).await
+        let mut answers = Vec::new();
+        // The last one forward: a load comes on at that speed.
+        for side in STEPS {
+            self.reach(side * from).await?;
+            self.settle(side * from).await?;
+            self.turn(side * to, Some(Ramp::Time(Duration::ZERO))).await?;
+            answers.push(self.answer((from, to), side, time).await?);
+        }
+        Ok(mean(&answers))
     }
 
     /// The same without a step, at the speed after it: for a load that comes on.
@@ -191,16 +219,16 @@ impl Reader {
     /// # Errors
     /// See [`measure`](Self::measure).
     pub async fn hold_response(&mut self, time: Duration) -> Result<StepResponse, Failure> {
-        self.answer((0.0, 0.75 * self.bounds.speed_rpm), time).await
+        self.answer((0.0, 0.75 * self.bounds.speed_rpm), 1.0, time).await
     }
 
-    async fn answer(&mut self, step_rpm: (f64, f64), time: Duration) -> Result<StepResponse, Failure> {
+    async fn answer(&mut self, step_rpm: (f64, f64), side: f64, time: Duration) -> Result<StepResponse, Failure> {
         let readings = self.watch(time).await?;
         let whole = readings.first().zip(readings.last()).map_or(Duration::ZERO, |(first, last)| last.at - first.at);
         Ok(StepResponse {
             period_s: whole.as_secs_f64() / readings.len().saturating_sub(1).max(1) as f64,
             step_rpm,
-            speed_rpm: readings.iter().map(|reading| reading.rpm).collect(),
+            speed_rpm: readings.iter().map(|reading| side * reading.rpm).collect(),
             current_a: readings.iter().map(|reading| reading.current_a).collect(),
         })
     }
@@ -224,6 +252,21 @@ impl Reader {
         // One that may still be moving gets no further sign of life, and is left to its own watch.
         let network = self.drive.node().network();
         stood.and(network.release_guards([node].into_iter().collect()).await.map_err(Failure::from))
+    }
+}
+
+/// The mean of answers to one step, reading by reading, as far as all of them go.
+fn mean(answers: &[StepResponse]) -> StepResponse {
+    let count = answers.len() as f64;
+    let shortest = answers.iter().map(|answer| answer.speed_rpm.len()).min().unwrap_or(0);
+    let of = |values: fn(&StepResponse) -> &Vec<f64>| {
+        (0..shortest).map(|at| answers.iter().map(|answer| values(answer)[at]).sum::<f64>() / count).collect()
+    };
+    StepResponse {
+        period_s: answers.iter().map(|answer| answer.period_s).sum::<f64>() / count,
+        step_rpm: answers.first().map_or((0.0, 0.0), |answer| answer.step_rpm),
+        speed_rpm: of(|answer| &answer.speed_rpm),
+        current_a: of(|answer| &answer.current_a),
     }
 }
 

@@ -17,7 +17,7 @@ use crate::capture::Restorer;
 
 use super::{
     Bounds, Currents, Curves, Excursion, Found, GainAndPhase, Measurement, OutputLoad, Proposed, Reader, ResponseRow,
-    Setup, Shaft, StepResponse, Trial, Twin, Unreachable, loops_of, measure, motor_of,
+    Setup, Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of,
 };
 
 /// How often the load of a twin is corrected, and the relative difference at which it is right.
@@ -204,16 +204,17 @@ pub async fn find(
     let failed = |reason: &dyn std::fmt::Display| {
         Failure::new(format!("node {id}: nothing could be found")).at_node(id).because(reason)
     };
-    let mut motor = motor_of(model).ok_or_else(|| failed(&"no motor with magnets is known for its model"))?;
-    if let Some(constant) = request.torque_constant_nm_a {
-        motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
-    }
+    let motor = motor_of(model).ok_or_else(|| failed(&"no motor with magnets is known for its model"))?;
     let how = (request.period, request.bounds);
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
     let had = Setup::begin((drive, restorer), (model, loops), true, journal, on_kept).await?;
     let (found, twin, twin_off, response) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
             let currents = both(currents(drive, &had, request, excursion).await, had.put_back(drive).await)?;
+            let mut motor = motor;
+            if let Some(constant) = request.torque_constant_nm_a {
+                motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
+            }
             let shaft = Shaft { motor: &motor, gear: &gear, stated: &stated };
             let (found, twin, off) = by_readings((model, loops), &shaft, &had, (&currents, how.1)).await?;
             (found, twin, off, Vec::new())
@@ -221,8 +222,10 @@ pub async fn find(
         _ => {
             let measured = measure(drive, &had, loops, (how.0, how.1, request.cyclic), excursion).await;
             let measured = both(measured, had.put_back(drive).await)?;
-            let found = Found::of(&measured, &had, loops, &motor).map_err(|error| failed(&error))?;
-            let twin = Twin::new((model, loops), &found, &motor, gains_of(&had, loops));
+            let own = constant_of((model, loops), &motor, had.rated_constant());
+            let constant = request.torque_constant_nm_a.or(loops.torque_constant_nm_a).unwrap_or(own);
+            let found = Found::of(&measured, &had, loops, (&motor, constant)).map_err(|error| failed(&error))?;
+            let twin = Twin::new((model, loops), &found, (&motor, own), gains_of(&had, loops));
             let of_twin = twin.measure(&had.lowered(measured.gain_share), how).await?;
             let (off, response) = between(&measured, &of_twin, &found.plant).map_err(|error| failed(&error))?;
             (found, twin, off, response)
@@ -299,7 +302,8 @@ fn twin_with(
     shaft: &Shaft<'_>,
     had: &Setup,
 ) -> Twin {
-    let mut twin = Twin::with_load((model, loops), load.words(), shaft.motor);
+    let constant = shaft.motor.windings.torque_constant_nm_a();
+    let mut twin = Twin::with_load((model, loops), load.words(), (shaft.motor, constant));
     twin.values = gains_of(had, loops);
     twin
 }
@@ -346,10 +350,11 @@ impl From<&super::Gain> for GainRow {
 
 /// The values of the loops' objects.
 fn gains_of(setup: &Setup, loops: &devices::Loops) -> Vec<(Mux, i64)> {
-    let filter = loops.speed_filter.map(|filter| filter.object);
+    let others = [loops.position_proportional, loops.speed_filter].into_iter().flatten().map(|it| it.object);
     let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
-    let own = [loops.speed_proportional, loops.speed_integral.object(), loops.position_proportional.object];
-    let all = own.into_iter().chain(filter).chain(current);
+    let own = [loops.speed_proportional, loops.speed_integral.object()];
+    let rated = loops.rated.into_iter().flatten();
+    let all = own.into_iter().chain(others).chain(current).chain(rated);
     all.filter_map(|object| Some((object, setup.had(object)?))).collect()
 }
 

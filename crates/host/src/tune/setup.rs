@@ -45,7 +45,8 @@ impl Setup {
         let gains = [loops.speed_proportional, loops.speed_integral.object()];
         // Not changed, and looked at.
         let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
-        let others = [loops.position_proportional.object].into_iter().chain(loops.speed_filter.map(|it| it.object));
+        let scaled = [loops.position_proportional, loops.speed_filter].into_iter().flatten().map(|it| it.object);
+        let others = scaled.chain(loops.rated.into_iter().flatten());
         let ramps = loops.without_ramps.iter().map(|(object, _)| *object);
         let rows = model.dictionary.rows().iter().filter(|row| row.access.is_writable()).map(|row| row.mux());
         let pdos = rows.filter(|mux| PdoId::of_object(mux.index).is_some());
@@ -80,6 +81,12 @@ impl Setup {
         let mut raw = [0; 8];
         raw.get_mut(..bytes.len())?.copy_from_slice(bytes);
         Some(i64::from_le_bytes(raw))
+    }
+
+    /// The quotient of rated torque and rated current, N m/A, where the demand counts by them.
+    pub(super) fn rated_constant(&self) -> Option<f64> {
+        let [torque, current] = self.loops.rated?.map(|object| self.had(object).filter(|value| *value > 0));
+        Some(torque? as f64 / current? as f64)
     }
 
     /// The least and the largest value of an object.

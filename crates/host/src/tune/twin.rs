@@ -1,15 +1,15 @@
 //! A virtual drive that is what was found, to try gains on.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 use std::time::Duration;
 
 use can::Bitrate;
 use canopen::{Mux, NodeId};
-use devices::{AxisId, Description, Loops};
+use devices::{AxisId, Description, Integral, Loops, Scale};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
 use serde::Serialize;
-use sim::machine::{Order, order};
+use sim::machine::{Order, SpeedWorth, is_built_in, order};
 use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, StepperData, World};
 use words::failure::Failure;
 
@@ -21,8 +21,8 @@ pub(super) const NODE: NodeId = NodeId::MIN;
 const BOOT: Duration = Duration::from_secs(1);
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
-/// The load that comes on, by the current that holds it.
-const LOAD_A: f64 = 4.5;
+/// The load that comes on, by the current that holds it: a share of what is usual.
+const LOAD_SHARE: f64 = 0.3;
 /// The same of a motor with a reducer, at its output.
 const OUTPUT_LOAD_A: f64 = 1.0;
 
@@ -37,7 +37,10 @@ pub struct Twin {
     pub(super) values: Vec<(Mux, i64)>,
     /// What pushes its shaft in one direction, N m; positive against positive motion.
     load_nm: f64,
+    /// Torque per ampere of its own demand.
     torque_constant_nm_a: f64,
+    /// What its gains are worth, where its model does not say that.
+    speed_worth: Option<SpeedWorth>,
     /// Turns of the motor for one of its output.
     ratio: f64,
 }
@@ -70,6 +73,17 @@ pub(super) fn stepper_of(model: &'static Description) -> Option<StepperData> {
     order(model, &order_of).ok()?.stepper(AxisId(0))
 }
 
+/// Torque of a virtual drive's motor per ampere that its demand shows, N m/A: `rated` is the quotient of its rated values.
+pub fn constant_of((model, loops): (&Description, &Loops), motor: &MotorData, rated: Option<f64>) -> f64 {
+    let of_amplitude = motor.windings.torque_constant_nm_a();
+    match loops.demand.map(|demand| demand.scale) {
+        Some(Scale::Rated { .. }) => rated.unwrap_or(of_amplitude),
+        // A described servo shows an r.m.s. current.
+        Some(_) if !is_built_in(model) => SQRT_2 * of_amplitude,
+        _ => of_amplitude,
+    }
+}
+
 fn unmade(model: &Description, reason: impl std::fmt::Display) -> Failure {
     Failure::new(format!("the twin of a {} cannot be made", model.title)).because(reason)
 }
@@ -84,13 +98,13 @@ pub(super) fn bring_about(world: &mut World, stimulus: &sim::Stimulus) -> Result
 /// A world with one drive of a model, at whose shaft is what these words say.
 pub(super) fn world_of(
     model: &'static Description,
-    fidelity: Fidelity,
+    (fidelity, speed_worth): (Fidelity, Option<SpeedWorth>),
     load: &[String],
 ) -> Result<(World, Drive), Failure> {
     let mut world = World::new(Bitrate::M1, 1);
     let network = Network::new();
     world.add_station(network.clone());
-    let ordered = Order { fidelity, ..Order::new(model, NODE, Bitrate::M1) };
+    let ordered = Order { fidelity, speed_worth, ..Order::new(model, NODE, Bitrate::M1) };
     let machine = order(model, &ordered).map_err(|error| unmade(model, error))?;
     world.add_drive(NODE.raw(), machine).map_err(|error| unmade(model, error))?;
     for words in load {
@@ -101,17 +115,21 @@ pub(super) fn world_of(
 }
 
 impl Twin {
-    /// The twin of what was found; `values` are the drive's own settings that matter.
+    /// The twin of what was found; `values` are the drive's own settings that matter. Its motor is the model's own, or one that is
+    /// assumed: by the same current it speeds up as the drive does.
     pub fn new(
         (model, loops): (&'static Description, &Loops),
         found: &Found,
-        motor: &MotorData,
+        (motor, torque_constant_nm_a): (&MotorData, f64),
         values: Vec<(Mux, i64)>,
     ) -> Self {
         let rotor = motor.rotor;
         let wheel = if found.mechanics.elastic.is_some() { OUTPUT_WHEEL_SHARE * rotor.inertia_kg_m2 } else { 0.0 };
-        let inertia = (found.inertia_kg_m2() - rotor.inertia_kg_m2 - wheel).max(0.0);
-        let (dry, viscous) = (found.dry_nm() - rotor.coulomb_nm, found.viscous_nm_s() - rotor.viscous_nm_s);
+        let inertia = found.mechanics.inertia_kg_m2(torque_constant_nm_a);
+        let inertia = (inertia - rotor.inertia_kg_m2 - wheel).max(0.0);
+        let torque = |current_a: f64| current_a * torque_constant_nm_a;
+        let dry = torque(found.friction.dry_a) - rotor.coulomb_nm;
+        let viscous = torque(found.friction.viscous_a_s_rad) - rotor.viscous_nm_s;
         let mut load = vec![
             format!("load inertia {inertia}"),
             format!("load friction {} viscous {}", dry.max(0.0), viscous.max(0.0)),
@@ -121,17 +139,31 @@ impl Twin {
             let reduced = 1.0 / (1.0 / (inertia + wheel) + 1.0 / rotor.inertia_kg_m2);
             load.push(format!("load gear 1 0 {}", (TAU * elastic.resonance_hz).powi(2) * reduced));
         }
-        let torque_constant_nm_a = found.torque_constant_nm_a;
-        let ratio = motor.gear.map_or(1.0, |gear| gear.ratio);
-        let load_nm = found.friction.load_a * torque_constant_nm_a;
-        Self { model, loops: *loops, load, values, load_nm, torque_constant_nm_a, ratio }
+        let worth =
+            |object: Mux| values.iter().find(|(mux, _)| *mux == object).map(|(_, value)| (*value).max(1) as f64);
+        let amplitudes = torque_constant_nm_a / motor.windings.torque_constant_nm_a();
+        let speed_worth = worth(loops.speed_proportional).zip(worth(loops.speed_integral.object()));
+        let speed_worth = speed_worth.map(|(proportional, integral)| SpeedWorth {
+            proportional: (amplitudes * found.own.proportional / proportional) as f32,
+            integral: match loops.speed_integral {
+                Integral::Gain(_) => (amplitudes * found.own.integral / integral) as f32,
+                Integral::Time(_) => (found.own.proportional / (found.own.integral * integral)) as f32,
+            },
+        });
+        let load_nm = torque(found.friction.load_a);
+        let twin = Self::with_load((model, loops), load, (motor, torque_constant_nm_a));
+        Self { values, load_nm, speed_worth, ..twin }
     }
 
     /// A virtual drive with a load of these words, whatever was found.
-    pub fn with_load((model, loops): (&'static Description, &Loops), load: Vec<String>, motor: &MotorData) -> Self {
-        let torque_constant_nm_a = motor.windings.torque_constant_nm_a();
+    pub fn with_load(
+        (model, loops): (&'static Description, &Loops),
+        load: Vec<String>,
+        (motor, torque_constant_nm_a): (&MotorData, f64),
+    ) -> Self {
         let ratio = motor.gear.map_or(1.0, |gear| gear.ratio);
-        Self { model, loops: *loops, load, values: Vec::new(), load_nm: 0.0, torque_constant_nm_a, ratio }
+        let (values, loops) = (Vec::new(), *loops);
+        Self { model, loops, load, values, load_nm: 0.0, torque_constant_nm_a, speed_worth: None, ratio }
     }
 
     fn failed(&self, reason: impl std::fmt::Display) -> Failure {
@@ -168,7 +200,7 @@ impl Twin {
     }
 
     fn unbooted(&self, fidelity: Fidelity) -> Result<(World, Drive), Failure> {
-        let (mut world, drive) = world_of(self.model, fidelity, &self.load)?;
+        let (mut world, drive) = world_of(self.model, (fidelity, self.speed_worth), &self.load)?;
         if self.load_nm != 0.0 {
             self.push(&mut world, self.load_nm)?;
         }
@@ -212,7 +244,7 @@ impl Twin {
     ) -> Result<(StepResponse, StepResponse), Failure> {
         let mut bench = self.run(world, self.open(drive, values, how)).await?;
         let step = self.run(world, bench.step_response(f64::MAX, ANSWER_S)).await?;
-        self.push(world, self.load_nm + LOAD_A * self.torque_constant_nm_a)?;
+        self.push(world, self.load_nm + LOAD_SHARE * self.loops.usual_a * self.torque_constant_nm_a)?;
         let load = self.run(world, bench.hold_response(ANSWER_S)).await?;
         Ok((step, load))
     }
@@ -246,7 +278,9 @@ impl Twin {
     }
 
     async fn write(&self, drive: &Drive, values: &[(Mux, i64)]) -> Result<(), Failure> {
-        for (object, value) in self.values.iter().chain(self.loops.without_ramps).chain(values) {
+        let is_written = |object| self.model.row(object).is_some_and(|row| row.access.is_writable());
+        let all = self.values.iter().chain(self.loops.without_ramps).chain(values);
+        for (object, value) in all.filter(|(object, _)| is_written(*object)) {
             write(drive, *object, *value).await?;
         }
         Ok(())

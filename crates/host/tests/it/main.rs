@@ -9,5 +9,7 @@ mod init;
 mod params;
 mod stopping;
 mod tune;
+mod tune_capture;
 mod tune_joint;
+mod tune_named;
 mod tune_ramps;

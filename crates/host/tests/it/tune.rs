@@ -93,6 +93,11 @@ struct Measured {
     model: (&'static Description, &'static Loops),
 }
 
+/// A motor with its torque per ampere.
+pub(crate) fn with_constant(motor: &MotorData) -> (&MotorData, f64) {
+    (motor, motor.windings.torque_constant_nm_a())
+}
+
 /// `Err` where it is refused as unusable.
 fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Measured, tune::Unusable> {
     let (model, loops) = loops_of(drive).unwrap();
@@ -103,7 +108,7 @@ fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Mea
         (setup, measured)
     };
     let (setup, measured) = sim::block_on(world, run).unwrap();
-    let found = Found::of(&measured.unwrap(), &setup, loops, motor)?;
+    let found = Found::of(&measured.unwrap(), &setup, loops, (motor, motor.windings.torque_constant_nm_a()))?;
     Ok(Measured { found, setup, model: (model, loops) })
 }
 
@@ -147,7 +152,7 @@ fn random_wheels_are_identified_and_gains_proposed_for_them_are_stable_and_nearl
     let count = machines();
     for number in 0..count {
         let load = Load::random(&mut random, &motor);
-        let plant = Twin::with_load((model, loops), load.words(), &motor);
+        let plant = Twin::with_load((model, loops), load.words(), with_constant(&motor));
         let (mut world, drive) = plant.world().unwrap();
         let Measured { found, setup, model } = match identified(&mut world, &drive, &motor) {
             Ok(measured) => measured,
@@ -189,7 +194,7 @@ fn what_is_written_for_a_measurement_is_put_back_and_a_bound_that_is_reached_sto
     let model = devices::model("zlac8030l").unwrap();
     let motor = motor_of(model).unwrap();
     let loops = model.axes[0].loops.as_ref().unwrap();
-    let plant = Twin::with_load((model, loops), vec!["load inertia 0.02".into()], &motor);
+    let plant = Twin::with_load((model, loops), vec!["load inertia 0.02".into()], with_constant(&motor));
     let (mut world, drive) = plant.world().unwrap();
     let before = values(&mut world, &drive, &WRITTEN);
     let bounds = Bounds { travel_turns: 0.5, ..Bounds::default() };
@@ -237,7 +242,8 @@ pub(crate) fn tried(twin: &Twin, values: &[(Mux, i64)], how: (Duration, Bounds))
 fn wheel(load: &[&str]) -> Twin {
     let model = devices::model("zlac8030l").unwrap();
     let loops = model.axes[0].loops.as_ref().unwrap();
-    Twin::with_load((model, loops), load.iter().map(|&words| words.to_owned()).collect(), &motor_of(model).unwrap())
+    let motor = motor_of(model).unwrap();
+    Twin::with_load((model, loops), load.iter().map(|&words| words.to_owned()).collect(), with_constant(&motor))
 }
 
 #[test]
@@ -431,7 +437,7 @@ fn a_load_that_pushes_all_the_time_pushes_the_twin_too() {
     let Measured { found, model, .. } = identified(&mut world, &drive, &motor).unwrap();
     let load_a = found.friction.load_a;
     assert!(relative(load_a * motor.windings.torque_constant_nm_a(), 1.5) < 0.05, "{load_a}");
-    let twin = Twin::new(model, &found, &motor, Vec::new());
+    let twin = Twin::new(model, &found, with_constant(&motor), Vec::new());
     let trial = tried(&twin, &[], (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() }));
     let speed = trial.load.step_rpm.1 * cia402::RAD_S_PER_RPM;
     let held_a = found.friction.dry_a + found.friction.viscous_a_s_rad * speed + load_a;

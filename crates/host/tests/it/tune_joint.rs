@@ -11,7 +11,7 @@ use master::units::Rpm;
 use sim::machine::TimingMode;
 use sim::{MotorData, Place, Prng, Stimulus};
 
-use crate::tune::tried;
+use crate::tune::{tried, with_constant};
 
 /// What the plant has at the motor's shaft: closed forms of its own equations (`plant::gear`).
 struct Truth {
@@ -45,7 +45,7 @@ fn request() -> Request {
 fn plant(name: &str, load: &OutputLoad) -> (Twin, MotorData, (&'static Description, &'static Loops)) {
     let model = devices::model(name).unwrap();
     let (motor, loops) = (motor_of(model).unwrap(), model.axes[0].loops.as_ref().unwrap());
-    (Twin::with_load((model, loops), load.words(), &motor), motor, (model, loops))
+    (Twin::with_load((model, loops), load.words(), with_constant(&motor)), motor, (model, loops))
 }
 
 /// Answers as late as a device's, which the twin's are not.
@@ -219,4 +219,26 @@ fn a_joint_that_hears_no_program_any_more_in_a_measurement_stops_by_its_own_watc
     world.run_for(Duration::from_secs(3));
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
     drop(run);
+}
+
+/// What decides whether new gains stay: the same gains have to give the same error, wherever the shaft stood.
+#[test]
+fn a_step_of_a_joint_gives_the_same_error_wherever_it_begins() {
+    let load = OutputLoad { inertia_kg_m2: 0.2, dry_nm: 0.5, viscous_nm_s: 0.3 };
+    let (plant, ..) = plant("m8025e25b50", &load);
+    let (mut world, drive) = plant.world().unwrap();
+    world.set_timing(TimingMode::Device);
+    let restorer = Restorer::of(&drive);
+    let mut errors = Vec::new();
+    for degrees in [0.0, 70.0, 140.0, 210.0] {
+        let run = async {
+            let options = MotionOptions::default();
+            drive.move_absolute(master::units::Angle::Turns(degrees / 360.0), options).await.unwrap();
+            drive.disable().await.unwrap();
+            host::tune::step((&drive, &restorer), &request(), 150.0, &mut Excursion::default()).await.unwrap()
+        };
+        errors.push(sim::block_on(&mut world, run).unwrap().error());
+    }
+    let (least, most) = errors.iter().fold((f64::MAX, 0.0_f64), |(least, most), it| (least.min(*it), most.max(*it)));
+    assert!(most / least < 1.02, "{errors:?}");
 }

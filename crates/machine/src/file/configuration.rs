@@ -214,7 +214,7 @@ fn whole_ms(field: &Field<'_>, object: &str) -> Result<u16, Problem> {
     ms.ok_or_else(|| field.problem(format!("{object} counts whole ms; expected \"1ms\" to \"65535ms\"")))
 }
 
-fn time(field: &Field<'_>) -> Result<Duration, Problem> {
+pub(super) fn time(field: &Field<'_>) -> Result<Duration, Problem> {
     parse_duration(&field.words(TIME)?).map_err(|error| field.problem(format!("{error}; expected {TIME}")))
 }
 

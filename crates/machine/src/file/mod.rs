@@ -9,6 +9,7 @@ mod configuration;
 mod cycles;
 mod fidelity;
 mod fields;
+mod loops;
 mod motion;
 mod placed;
 mod seat;

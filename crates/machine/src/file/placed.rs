@@ -15,7 +15,7 @@ use words::node::node;
 
 use super::fields::noted;
 use super::seat::Seat;
-use super::{configuration, surroundings, units};
+use super::{configuration, loops, surroundings, units};
 
 /// What a machine file may say of a drive.
 pub const DRIVE_KEYS: &[&str] = &[
@@ -33,6 +33,7 @@ pub const DRIVE_KEYS: &[&str] = &[
     "faults",
     "battery",
     "units",
+    "loops",
     "pdos",
     "limits",
     "heartbeat",
@@ -119,7 +120,8 @@ impl Placed {
         let source_at = source_at.map(|field| field.problem("").locate(table.text()));
         let around = surroundings::around(table, &mut problems);
         let shaft = noted(Seat::parse(table), &mut problems);
-        let (described, id) = match (model(table, folder), node_id(table)) {
+        let described = model(table, folder).and_then(|model| loops::named(table, model));
+        let (described, id) = match (described, node_id(table)) {
             (Ok(described), Ok(id)) => (described, id),
             (described, id) => {
                 problems.extend(described.err().into_iter().chain(id.err()));
@@ -139,7 +141,7 @@ impl Placed {
         let start_up = configuration::values(table, spec.description(), id, &mut problems);
         let gear = noted(units::gear(table), &mut problems);
         let sdo_server = noted(configuration::sdo_server(table), &mut problems);
-        let of_master = |key: &str| key == units::KEY || configuration::KEYS.contains(&key);
+        let of_master = |key: &str| [units::KEY, loops::KEY].contains(&key) || configuration::KEYS.contains(&key);
         let of_simulator = |key: &&str| !matches!(*key, "model" | "node") && !of_master(key);
         let keys = DRIVE_KEYS.iter().copied().filter(|key| of_simulator(key) && table.get(key).is_some());
         if problems.is_empty() {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 from . import _native
 from ._native import Job, model_name
 from .errors import MasterError
-from .reports import Capture, DriveState, MotionReport, TestMotionRun, Tuning
+from .reports import Capture, DriveState, MotionReport, RampTuning, TestMotionRun, Tuning
 from .words import number
 
 if TYPE_CHECKING:
@@ -59,6 +59,9 @@ class _Orders:
 
     def _tune(self, journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any) -> Job:
         return self._whole(_native.tune_drive, journal, order)
+
+    def _tune_ramps(self, journal: Optional[Union[str, "os.PathLike[str]"]], **order: Any) -> Job:
+        return self._whole(_native.tune_ramps_of, journal, order)
 
     def _whole(
         self,
@@ -428,7 +431,7 @@ class Drive(_Orders):
         phase_margin: float = 40.0,
         position: bool = False,
         speed_rpm: Optional[float] = None,
-        current_a: float = 15.0,
+        current_a: Optional[float] = None,
         travel_turns: float = 40.0,
         period: float = 0.001,
         torque_constant: Optional[float] = None,
@@ -436,13 +439,13 @@ class Drive(_Orders):
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> Tuning:
         """Finds gains for its loops: it is measured, a twin of it is made, gains are proposed and tried on the twin, and then on the drive. The
-        shaft turns to and fro. What ``ferrodrive tune`` does.
+        shaft turns to and fro. What ``ferrodrive tune`` does; of a stepper: :meth:`tune_ramps`.
 
         :param bandwidth: where the gain of the speed loop is to fall to one, in Hz; instead of a phase margin
         :param phase_margin: degrees that are to be left there; as stiff as that allows
         :param position: the loop of position too
-        :param speed_rpm: highest speed of the measurement, of the motor's shaft: 120 without it, of a joint 600
-        :param current_a: the most that the speed loop may ask for
+        :param speed_rpm: highest speed of the measurement, of the motor's shaft: 120 without it, of a joint 600, of a servo what ``loops`` of its machine file says
+        :param current_a: the most that the speed loop may ask for: 15 without it, of a servo what ``loops`` says
         :param travel_turns: farthest that the shaft may turn from where it stands
         :param period: time between two samples in s
         :param torque_constant: N m per A of another motor than the model's own
@@ -461,6 +464,44 @@ class Drive(_Orders):
             travel_turns=travel_turns, period=period, torque_constant_nm_a=torque_constant, apply=apply,
         )
         report: Tuning = self.network._finish(tuning)
+        return report
+
+    def tune_ramps(
+        self,
+        *,
+        speed_rpm: float = 600.0,
+        inertia_kg_m2: float = 0.0,
+        friction_nm: float = 0.0,
+        load_nm: float = 0.0,
+        margin: float = 1.5,
+        ramp: Optional[float] = None,
+        apply: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> RampTuning:
+        """Current, microsteps and ramps with which a stepper without an encoder loses no step with a load: computed, and tried on its twin. It
+        is not turned. What ``ferrodrive tune`` does with a stepper.
+
+        :param speed_rpm: speed that is to be reached
+        :param inertia_kg_m2: inertia of what it turns, without its rotor
+        :param friction_nm: dry friction of that
+        :param load_nm: what pushes its shaft in one direction, such as a weight
+        :param margin: how many times the torque that is needed there is to be
+        :param ramp: time in s in which the speed is to be reached: the shortest that keeps the margin without it
+        :param apply: write the values to the drive as a transaction; they are not stored
+        :param journal: as of :meth:`capture`
+        :raises MasterError: no ramp keeps the margin, with the speed that would; or it is not such a stepper
+
+        >>> try:
+        ...     drive.tune_ramps(inertia_kg_m2=3e-5)
+        ... except ferrodrive.MasterError as error:
+        ...     "its model is not a stepper" in str(error)
+        True
+        """
+        tuning = self._tune_ramps(
+            journal, speed_rpm=speed_rpm, inertia_kg_m2=inertia_kg_m2, friction_nm=friction_nm, load_nm=load_nm, margin=margin,
+            ramp=ramp, apply=apply,
+        )
+        report: RampTuning = self.network._finish(tuning)
         return report
 
 
@@ -623,7 +664,7 @@ class AsyncDrive(_Orders):
         phase_margin: float = 40.0,
         position: bool = False,
         speed_rpm: Optional[float] = None,
-        current_a: float = 15.0,
+        current_a: Optional[float] = None,
         travel_turns: float = 40.0,
         period: float = 0.001,
         torque_constant: Optional[float] = None,
@@ -636,4 +677,24 @@ class AsyncDrive(_Orders):
             travel_turns=travel_turns, period=period, torque_constant_nm_a=torque_constant, apply=apply,
         )
         report: Tuning = await self.network._finish_soon(tuning)
+        return report
+
+    async def tune_ramps(
+        self,
+        *,
+        speed_rpm: float = 600.0,
+        inertia_kg_m2: float = 0.0,
+        friction_nm: float = 0.0,
+        load_nm: float = 0.0,
+        margin: float = 1.5,
+        ramp: Optional[float] = None,
+        apply: bool = False,
+        journal: Optional[Union[str, "os.PathLike[str]"]] = None,
+    ) -> RampTuning:
+        """As :meth:`Drive.tune_ramps`."""
+        tuning = self._tune_ramps(
+            journal, speed_rpm=speed_rpm, inertia_kg_m2=inertia_kg_m2, friction_nm=friction_nm, load_nm=load_nm, margin=margin,
+            ramp=ramp, apply=apply,
+        )
+        report: RampTuning = await self.network._finish_soon(tuning)
         return report

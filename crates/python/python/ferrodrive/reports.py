@@ -103,6 +103,28 @@ class Tuning(TypedDict):
     notes: list[str]
 
 
+class RampTuning(TypedDict):
+    """Of :meth:`Drive.tune_ramps`, as ``docs/json.md`` has it: the torques at the speed, the values that are proposed, the least margin on
+    the ramp before and after, and how many steps the twin lost under a load so many times as large."""
+
+    node: int
+    model: str
+    supply_v: float
+    inertia_kg_m2: float
+    speed_rpm: float
+    pull_out_nm: float
+    needed_nm: float
+    highest_rpm: float
+    start_rpm: float
+    margin: float
+    margin_before: float
+    margin_after: float
+    values: list[dict[str, Any]]
+    twin: list[dict[str, Any]]
+    applied: bool
+    notes: list[str]
+
+
 class AxisState(TypedDict):
     """An axis of a group in its last cycle."""
 

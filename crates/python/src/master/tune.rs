@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use host::capture::with_left;
-use host::tune::{Bounds, Order, loops_of, tune};
+use host::tune::{Bounds, LoadOrder, Order, loops_of, tune, tune_ramps};
 use master::cyclic::CyclicOptions;
 use pyo3::prelude::*;
 
@@ -26,7 +26,7 @@ pub(crate) struct TuneOrder {
     #[pyo3(item)]
     speed_rpm: Option<f64>,
     #[pyo3(item)]
-    current_a: f64,
+    current_a: Option<f64>,
     #[pyo3(item)]
     travel_turns: f64,
     #[pyo3(item)]
@@ -54,7 +54,7 @@ pub(crate) fn tune_drive(
         phase_margin_deg: order.phase_margin_deg,
         position: order.position,
         speed_rpm: order.speed_rpm,
-        current_a: order.current_a,
+        current_a: order.current_a.unwrap_or(Bounds::default().current_a),
         travel_turns: order.travel_turns,
         period_ms: duration(order.period)?.as_secs_f64() * 1e3,
         torque_constant_nm_a: order.torque_constant_nm_a,
@@ -64,8 +64,12 @@ pub(crate) fn tune_drive(
     request.apply = order.apply;
     network.get().begin_leading_back(py, |way_back| async move {
         let drive = asked.drive().await?;
+        let (_, loops) = loops_of(&drive)?;
         if wanted.speed_rpm.is_none() {
-            request.bounds.speed_rpm = loops_of(&drive)?.1.usual_rpm;
+            request.bounds.speed_rpm = loops.usual_rpm;
+        }
+        if order.current_a.is_none() {
+            request.bounds.current_a = loops.usual_a;
         }
         let restorer = way_back.of(&drive);
         let tuned = tune((&drive, restorer), &request, &(), std::future::ready(false)).await;
@@ -75,5 +79,52 @@ pub(crate) fn tune_drive(
             Some(failure) => Err(Trouble::Reported(with_left(failure, &left), Box::new(report))),
             None => Ok(report),
         }
+    })
+}
+
+/// What a stepper turns, and how fast it is to be, in plain values.
+#[derive(FromPyObject)]
+pub(crate) struct RampOrder {
+    #[pyo3(item)]
+    inertia_kg_m2: f64,
+    #[pyo3(item)]
+    friction_nm: f64,
+    #[pyo3(item)]
+    load_nm: f64,
+    #[pyo3(item)]
+    speed_rpm: f64,
+    #[pyo3(item)]
+    margin: f64,
+    #[pyo3(item)]
+    ramp: Option<f64>,
+    #[pyo3(item)]
+    apply: bool,
+    #[pyo3(item)]
+    journal: Option<PathBuf>,
+}
+
+/// Computes ramps and currents of a stepper for a load, and writes them, if that is asked for.
+#[pyfunction]
+pub(crate) fn tune_ramps_of(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    order: RampOrder,
+) -> PyResult<Job> {
+    let asked = AskedDrive::of(network.get(), node, model)?;
+    let wanted = LoadOrder {
+        inertia_kg_m2: order.inertia_kg_m2,
+        friction_nm: order.friction_nm,
+        load_nm: order.load_nm,
+        speed_rpm: order.speed_rpm.abs(),
+        margin: order.margin,
+        ramp_ms: order.ramp.map(duration).transpose()?.map(|ramp| ramp.as_secs_f64() * 1e3),
+    };
+    let mut request = wanted.request().map_err(|failure| bad_value(failure.what))?;
+    (request.apply, request.journal) = (order.apply, asked.journal(order.journal));
+    network.get().begin_said(py, async move {
+        let drive = asked.drive().await?;
+        Ok(Value::report(&tune_ramps(&drive, &request, &()).await?))
     })
 }

@@ -2,6 +2,7 @@
 
 use processes::{Ended, Simulator, ferrodrive, page, scratch};
 use serde_json::{Value, json};
+use std::f64::consts::TAU;
 
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
 
@@ -163,6 +164,22 @@ fn a_failure_says_what_to_do_next() {
     }
 }
 
+/// A record of another instrument: an inertia of 1/50 kg m² per (N m/A), excited by a current of many frequencies.
+fn excited() -> String {
+    let (mut text, mut speed, mut angle) = ("t_s,4.current_a,4.position_deg\n".to_owned(), 0.0_f64, 0.0);
+    for row in 0..8000 {
+        let time_s = f64::from(row) * 1e-3;
+        // Phases by the square of the number keep the peak low.
+        let tone = |tone: u32| (TAU * f64::from(tone) * time_s + f64::from(tone * tone)).sin();
+        let current: f64 = (1..=60).map(tone).sum::<f64>() * 0.3;
+        text += &format!("{time_s:.3},{current:.6},{angle:.6}\n");
+        let rate = 50.0 * current - 2.0 * speed;
+        angle += (1e-3 * (speed + 0.5e-3 * rate)).to_degrees();
+        speed += 1e-3 * rate;
+    }
+    text
+}
+
 #[test]
 fn files_and_logs_are_reported_in_the_same_form() {
     let directory = scratch("schema");
@@ -178,6 +195,8 @@ fn files_and_logs_are_reported_in_the_same_form() {
     let bus = path("bus.yml");
     let text = "master: {node_id: 127, heartbeat_producer: 100}\nwheel: {node_id: 4, dcf: a.eds, heartbeat_producer: 1000}\nx: {node_id: 0}\n";
     std::fs::write(&bus, text).unwrap();
+    let captured = path("captured.csv");
+    std::fs::write(&captured, excited()).unwrap();
     for (arguments, definition) in [
         (&["eds", "lint", &sheet][..], "eds_lint"),
         (&["check", &bus], "check"),
@@ -194,6 +213,9 @@ fn files_and_logs_are_reported_in_the_same_form() {
         (&["replay", &log, "--skip-motion"], "replay"),
         (&["record", "4", "606C", "--out", &csv, "--for", "100ms"], "record"),
         (&["capture", "4", "velocity", "--for", "50ms", "-o", &csv], "capture"),
+        (&["tune", "4", "--capture", &captured], "tune_capture"),
+        (&["tune", "4", "--capture", &captured, "--torque-constant", "0.5"], "tune_capture"),
+        (&["tune", "5", "--capture", &captured], "failure"),
     ] {
         hold(&ferrodrive(&[arguments, &["--json"]].concat()), definition, &format!("{arguments:?}"));
     }

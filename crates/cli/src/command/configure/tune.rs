@@ -1,17 +1,20 @@
 //! `ferrodrive tune`: gains for a drive's loops, from a measurement; ramps and currents of a stepper, from its load.
 
 use std::io::{IsTerminal, stdin};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
 use host::network::params::journal::default_path;
-use host::tune::{Bounds, RampReport, RampRequest, Request, TuneReport};
+use host::tune::{Bounds, CaptureReport, RampReport, RampRequest, Request, TuneReport};
 use master::units::{Amperes, Angle, Rpm, parse_duration};
+use recording::Capture;
+use sim::Place;
 use words::node::node;
 
 use super::params::journal::note_kept;
 use crate::command::cycles::CycleArgs;
+use crate::command::record_and_replay::plot::read_record;
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
@@ -34,6 +37,7 @@ enum WhichLoop {
 
 /// Find gains for the loops of a drive, or ramps and currents of a stepper that lose no step
 ///
+/// Of a servo by CiA 402 `loops` of its machine file say which objects its maker has for them.
 /// A stepper without an encoder has no loops, and shows no lost step: what it needs is computed from the load that --load-inertia,
 /// --load-friction and --load-torque name, with a margin, and tried on its twin. It is not turned. Any other drive is measured, and
 /// its gains are tried on its twin, then on the drive:
@@ -45,6 +49,7 @@ enum WhichLoop {
 #[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
     ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
     ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply\n  \
+    ferrodrive tune 4 --capture run.mcap --torque-constant 0.9\n  \
     ferrodrive tune 2 --speed 600rpm --load-inertia 3e-5 --load-friction 0.05")]
 pub(crate) struct Tune {
     /// Node-ID
@@ -59,12 +64,16 @@ pub(crate) struct Tune {
     /// Objective: degrees that are to be left there
     #[arg(long, value_name = "DEGREES", default_value = "40")]
     phase_margin: f64,
-    /// Highest speed of the motor's shaft (default: 120rpm, of a joint and of a stepper 600rpm)
+    /// Highest speed of the motor's shaft (default: what is usual)
+    ///
+    /// 120rpm, of a joint and of a stepper 600rpm, of a servo by CiA 402 what `loops` of its file says.
     #[arg(long, value_name = "SPEED")]
     speed: Option<Rpm>,
-    /// Most current that the speed loop may ask for meanwhile
-    #[arg(long, value_name = "CURRENT", default_value = "15A")]
-    current: Amperes,
+    /// Most current that the loop may ask for (default: what is usual)
+    ///
+    /// 15A, of a servo by CiA 402 what `loops` of its file says.
+    #[arg(long, value_name = "CURRENT")]
+    current: Option<Amperes>,
     /// Farthest that the motor's shaft, before a reducer, may turn from where it stands: 20turn, 90deg
     ///
     /// A number alone is turns.
@@ -76,6 +85,12 @@ pub(crate) struct Tune {
     /// Torque per ampere of another motor than the model's own, in N·m/A
     #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
+    /// Say what this record of the drive shows; nothing moves
+    ///
+    /// Of `capture`, `record`, another instrument, or a log of frames: frequency response with coherence, masses and speed loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or
+    /// velocity_rpm. No gains are proposed.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["apply", "bandwidth"])]
+    capture: Option<PathBuf>,
     /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
     #[arg(long, value_name = "KG_M2", default_value = "0", hide_short_help = true)]
     load_inertia: f64,
@@ -116,7 +131,7 @@ fn turns(text: &str) -> Result<f64, String> {
 }
 
 impl Tune {
-    fn request(&self, journal: Option<PathBuf>, usual_rpm: f64) -> Request {
+    fn request(&self, journal: Option<PathBuf>, (usual_rpm, usual_a): (f64, f64)) -> Request {
         let objective =
             self.bandwidth.map_or(tune::Objective::PhaseMargin(self.phase_margin), tune::Objective::Bandwidth);
         Request {
@@ -125,7 +140,7 @@ impl Tune {
             period: self.period,
             bounds: Bounds {
                 speed_rpm: self.speed.map_or(usual_rpm, |Rpm(rpm)| rpm.abs()),
-                current_a: self.current.0.abs(),
+                current_a: self.current.map_or(usual_a, |Amperes(current)| current.abs()),
                 travel_turns: self.travel,
             },
             cyclic: self.cycles.options(),
@@ -139,8 +154,9 @@ impl Tune {
 
     /// Whether what was typed is within its ranges: no bus is needed to see that.
     pub(crate) fn check(&self) -> Result<(), Failure> {
-        // The usual speed of a model is within them.
-        self.request(None, 120.0).check()?;
+        // What is usual for a model is within them.
+        let Bounds { speed_rpm, current_a, .. } = Bounds::default();
+        self.request(None, (speed_rpm, current_a)).check()?;
         Ok(self.ramp_request(None).check()?)
     }
 
@@ -164,6 +180,9 @@ impl Tune {
 
     /// Measures or computes, and proposes; and writes, if that was asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<Tuned, Failure> {
+        if let Some(path) = &self.capture {
+            return self.of_capture(path, context).map(|report| Tuned::Captured(Box::new(report)));
+        }
         let drive = context.known_drive(self.node).await?;
         let journal = (!context.is_embedded()).then(|| default_path(self.node));
         if host::tune::open_loop_of(&drive).is_some() {
@@ -171,7 +190,7 @@ impl Tune {
             return Ok(Tuned::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?));
         }
         let (_, loops) = host::tune::loops_of(&drive)?;
-        let request = self.request(journal, loops.usual_rpm);
+        let request = self.request(journal, (loops.usual_rpm, loops.usual_a));
         let guard = self.guard.begin(context, &drive).await?;
         let restorer = host::capture::Restorer::of(&drive);
         context.restore_at_end(Restorer::Capture(restorer.clone()));
@@ -182,11 +201,25 @@ impl Tune {
         let released = Guard::end(guard, context, &drive, false).await;
         let report = done?;
         released?;
-        if let Some(path) = &self.picture {
-            let written = std::fs::write(path, report.picture.to_svg());
-            written.map_err(|error| Failure::of_writing("the picture", path, &error))?;
-        }
+        self.draw(&report.picture)?;
         Ok(Tuned::Gains(Box::new(report)))
+    }
+
+    fn of_capture(&self, path: &Path, context: &Context) -> Result<CaptureReport, Failure> {
+        let unread = |reason: String| {
+            Failure::bad_file(format!("the record {} has nothing of node {}", path.display(), self.node))
+                .because(reason)
+        };
+        let recorded = read_record(path, context.decoder())?;
+        let capture = Capture::of(&recorded, Some(Place::node(self.node.raw()))).map_err(unread)?;
+        let report = host::tune::of_capture(&capture, self.torque_constant)?;
+        self.draw(&report.picture)?;
+        Ok(report)
+    }
+
+    fn draw(&self, picture: &plot::Poster) -> Result<(), Failure> {
+        let Some(path) = &self.picture else { return Ok(()) };
+        std::fs::write(path, picture.to_svg()).map_err(|error| Failure::of_writing("the picture", path, &error))
     }
 }
 
@@ -198,6 +231,8 @@ pub(crate) enum Tuned {
     Gains(Box<TuneReport>),
     /// Of a stepper without an encoder.
     Ramps(RampReport),
+    /// Of a file.
+    Captured(Box<CaptureReport>),
 }
 
 impl Report for Tuned {
@@ -205,6 +240,7 @@ impl Report for Tuned {
         match self {
             Self::Gains(report) => report.text(paint),
             Self::Ramps(report) => report.text(paint),
+            Self::Captured(report) => report.text(paint),
         }
     }
 }
@@ -241,6 +277,44 @@ impl Report for RampReport {
         } else {
             UNCHANGED.to_owned()
         });
+        lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
+        lines.join("\n")
+    }
+}
+
+impl Report for CaptureReport {
+    fn text(&self, _: Paint) -> String {
+        let [used, period_ms] = [self.rows as f64, self.period_s * 1e3];
+        let mut lines = vec![
+            format!("node {}: {used:.0} rows {period_ms:.2} ms apart, by {}", self.node, self.quantities.join(", ")),
+            match (self.inertia_kg_m2, self.viscous_friction_nm_s) {
+                (Some(inertia), Some(viscous)) => {
+                    format!(
+                        "inertia {} kg·m², viscous friction {} N·m·s/rad",
+                        three_digits(inertia),
+                        three_digits(viscous)
+                    )
+                }
+                _ => format!(
+                    "{:.1} rad/s² for each A, viscous friction {:.3} 1/s of that inertia",
+                    self.gain_rad_s2_a, self.viscous_per_s
+                ),
+            },
+            match (self.anti_resonance_hz, self.resonance_hz) {
+                (Some(anti), Some(resonance)) => format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz"),
+                _ => "no resonance was found".to_owned(),
+            },
+            format!(
+                "delay {:.1} ms; coherent at {} of {} frequencies; the model is {:.0} % off",
+                self.delay_ms,
+                self.coherent,
+                self.frequencies,
+                100.0 * self.model_off
+            ),
+        ];
+        if let (Some(proportional), Some(integral)) = (self.proportional_a_s_rad, self.integral_a_rad) {
+            lines.push(format!("its speed loop: {proportional:.3} A/(rad/s), {integral:.2} A/rad"));
+        }
         lines.extend(self.notes.iter().map(|note| format!("note: {note}")));
         lines.join("\n")
     }

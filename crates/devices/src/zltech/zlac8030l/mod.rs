@@ -102,13 +102,16 @@ const LOOPS: Loops = Loops {
     speed_proportional: Mux::new(0x201D, 0),
     speed_integral: Integral::Gain(Mux::new(0x201E, 0)),
     speed_filter: Some(Quantity::new(0x2018, 0, 1e-6)),
-    position_proportional: Quantity::new(0x2020, 0, 0.2),
+    position_proportional: Some(Quantity::new(0x2020, 0, 0.2)),
     current: Some((Quantity::new(0x2019, 0, 1e-3), Quantity::new(0x201A, 0, 1.0))),
     without_ramps: &[(Mux::new(0x6083, 0), 0), (Mux::new(0x6084, 0), 0)],
     period: Duration::from_micros(500),
     stated: None,
     gain_step: 1,
     usual_rpm: 120.0,
+    usual_a: 15.0,
+    torque_constant_nm_a: None,
+    rated: None,
 };
 
 /// All objects are in one list.

@@ -68,8 +68,9 @@ impl Shaft {
             self.publish_waiting(values);
         } else if !slots.is_target(slot) {
             let index = values.table().row(slot).index;
+            let is_gain = self.named.is_some_and(|named| named.has(slot));
             let known = index >= 0x6000;
-            self.parameters_changed |= known || index == COMMUNICATION_CYCLE_PERIOD.index;
+            self.parameters_changed |= known || is_gain || index == COMMUNICATION_CYCLE_PERIOD.index;
             return if known { Written::Value } else { Written::Elsewhere };
         }
         Written::Value

@@ -37,6 +37,9 @@ impl Shaft {
         write(values, slots.current, libm::roundf(current * 1e3) as i64);
         let demanded = self.parameters.torque(self.servo.setpoint_a(), &self.motor);
         write(values, slots.torque_demand, demanded * scales.direction() as i64);
+        if let Some((slot, shown)) = self.named.and_then(|named| named.shown(self.servo.setpoint_a())) {
+            write(values, Some(slot), shown * scales.direction() as i64);
+        }
         write(values, slots.bus_voltage, libm::roundf(bus_v * 1e3) as i64);
         write(values, slots.digital_inputs, i64::from(digital_inputs(sensors).0));
         self.publish_demand(values, position);

@@ -13,6 +13,7 @@ mod zlac8030l;
 mod zlim42c;
 
 pub use boxed::Boxed;
+pub use drives::servo::SpeedWorth;
 pub use mjoint::{Joint, MJointMachine, mjoint};
 pub use node::NodeMachine;
 pub use order::{Order, OrderError};

@@ -12,6 +12,7 @@ use devices::variant::{Preset, PresetError, Variant};
 use drives::Fidelity;
 use drives::engine::storage::StoredImage;
 use drives::node::{Memory, is_makers_mark, is_storable};
+use drives::servo::SpeedWorth;
 
 /// What is wanted of a drive beside its model.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub struct Order {
     pub unconfigured: bool,
     /// How much of it is computed.
     pub fidelity: Fidelity,
+    /// What counts of the gains of its velocity loop are worth: of a described servo whose description names them.
+    pub speed_worth: Option<SpeedWorth>,
 }
 
 impl Order {
@@ -41,6 +44,7 @@ impl Order {
             presets: Vec::new(),
             unconfigured: false,
             fidelity: Fidelity::Full,
+            speed_worth: None,
         }
     }
 

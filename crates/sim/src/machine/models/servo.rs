@@ -125,6 +125,7 @@ fn hardware(order: &Order, memory: Memory<Boxed>) -> Hardware<Boxed> {
         braking_ohm: bleeder.resistance_ohm as f32,
         braking_w: bleeder.rated_power_w as f32,
         bus_v: bus_v as f32,
+        speed_worth: order.speed_worth,
     };
     Hardware { node_id: order.node, bitrate: order.bitrate, motors: [motor; MAX_AXES], memory }
 }

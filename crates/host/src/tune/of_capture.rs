@@ -1,0 +1,197 @@
+//! What a capture of any instrument shows of a drive: its frequency response with coherence, one or two masses, and the speed loop where
+//! the set-point was captured too. Nothing moves, and no gains are proposed: what a count of them is worth on that drive is not in
+//! a capture.
+
+use std::f64::consts::TAU;
+
+use cia402::RAD_S_PER_RPM;
+use plot::{Figure, Poster};
+use recording::{Capture, Trace};
+use serde::Serialize;
+use tune::{Mechanics, Response, Samples};
+use words::failure::Failure;
+
+/// Signals by the names of their quantities, the best first, each with how many rad, rad/s or A its unit is.
+const SET_POINTS: [(&str, f64); 4] = [
+    ("velocity_demand_rpm", RAD_S_PER_RPM),
+    ("target_velocity_rpm", RAD_S_PER_RPM),
+    ("sent_target_velocity_rpm", RAD_S_PER_RPM),
+    ("set_point_rpm", RAD_S_PER_RPM),
+];
+const CURRENTS: [(&str, f64); 2] = [("current_demand_a", 1.0), ("current_a", 1.0)];
+const POSITIONS: [(&str, f64); 1] = [("position_deg", TAU / 360.0)];
+const SPEEDS: [(&str, f64); 1] = [("velocity_rpm", RAD_S_PER_RPM)];
+
+/// Times between two rows that are as much longer than the others are gaps; and as much shorter than that they are all equal.
+const GAP: f64 = 1.5;
+const EVEN: f64 = 0.1;
+
+/// What was found in a capture. Torques and inertia are those at the shaft whose angle it has.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaptureReport {
+    /// Its node-ID.
+    pub node: u8,
+    /// Rows that were used: those without a gap between them.
+    pub rows: usize,
+    /// Time between two of them, s.
+    pub period_s: f64,
+    /// The quantities that were used: the current, the angle or speed, and the set-point, where there is one.
+    pub quantities: Vec<String>,
+    /// Frequencies at which the coherence was high enough.
+    pub coherent: usize,
+    /// Frequencies at which there is a response.
+    pub frequencies: usize,
+    /// Acceleration per current, (rad/s²)/A.
+    pub gain_rad_s2_a: f64,
+    /// Viscous friction over inertia, 1/s.
+    pub viscous_per_s: f64,
+    /// Inertia of all that turns, where the torque per ampere is known.
+    pub inertia_kg_m2: Option<f64>,
+    /// Viscous friction, where that is known.
+    pub viscous_friction_nm_s: Option<f64>,
+    /// Where the motor moves least, if the load swings.
+    pub anti_resonance_hz: Option<f64>,
+    /// Where it moves most.
+    pub resonance_hz: Option<f64>,
+    /// From the sample of the current to that of the motion.
+    pub delay_ms: f64,
+    /// How far the model of one or two masses is from the response: the median of the relative difference.
+    pub model_off: f64,
+    /// The proportional gain of the speed loop, A/(rad/s), where the set-point was captured.
+    pub proportional_a_s_rad: Option<f64>,
+    /// Its integral gain, A/rad.
+    pub integral_a_rad: Option<f64>,
+    /// What else is to be known.
+    pub notes: Vec<String>,
+    /// The response and the model, as a Bode plot.
+    #[serde(skip)]
+    pub picture: Poster,
+}
+
+/// What a capture shows of its drive; `torque_constant_nm_a` is the torque per ampere of its motor.
+///
+/// # Errors
+/// What it lacks, that its rows are not evenly spaced, and why nothing can be said of them.
+pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Result<CaptureReport, Failure> {
+    let failed = |reason: &dyn std::fmt::Display| {
+        Failure::new(format!("nothing can be found from the capture of node {}", capture.place)).because(reason)
+    };
+    let signals = Signals::of(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
+    let (samples, mut notes) = signals.samples(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
+    if capture.is_cut_off {
+        notes.push("the end of the file is missing: what is there was used".to_owned());
+    }
+    let response = tune::response(&samples, None).map_err(|error| failed(&error))?;
+    let found = tune::identify(&response).map_err(|error| failed(&error))?;
+    let own = (!samples.set_point_rad_s.is_empty()).then(|| tune::identify_loop(&response, 0.0).ok()).flatten();
+    if own.is_none() {
+        notes.push(
+            "without the set-point noise in the loop biases the response: capture velocity_demand too".to_owned(),
+        );
+    }
+    let inertia_kg_m2 = torque_constant_nm_a.map(|constant| found.inertia_kg_m2(constant));
+    if inertia_kg_m2.is_none() {
+        notes.push("the inertia takes the torque per ampere of its motor: --torque-constant".to_owned());
+    }
+    Ok(CaptureReport {
+        node: capture.place.node,
+        rows: samples.len(),
+        period_s: samples.period_s,
+        quantities: signals.names(),
+        coherent: response.coherent().count(),
+        frequencies: response.lines.len(),
+        gain_rad_s2_a: found.gain,
+        viscous_per_s: found.viscous_per_s,
+        inertia_kg_m2,
+        viscous_friction_nm_s: inertia_kg_m2.map(|inertia| inertia * found.viscous_per_s),
+        anti_resonance_hz: found.elastic.map(|elastic| elastic.anti_resonance_hz),
+        resonance_hz: found.elastic.map(|elastic| elastic.resonance_hz),
+        delay_ms: found.delay_s * 1e3,
+        model_off: found.off,
+        proportional_a_s_rad: own.map(|own| own.proportional),
+        integral_a_rad: own.map(|own| own.integral),
+        notes,
+        picture: picture(capture, &response, &found),
+    })
+}
+
+/// The traces that are used, each with what its unit is worth.
+struct Signals<'a> {
+    current: (&'a Trace, f64),
+    motion: (&'a Trace, f64),
+    is_angle: bool,
+    set_point: Option<(&'a Trace, f64)>,
+}
+
+impl<'a> Signals<'a> {
+    fn of(capture: &'a Capture) -> Result<Self, String> {
+        let find = |names: &[(&str, f64)]| {
+            names.iter().find_map(|(name, worth)| {
+                let trace = capture.traces.iter().find(|trace| trace.quantity == *name)?;
+                Some((trace, *worth))
+            })
+        };
+        let had = || capture.traces.iter().map(|trace| trace.quantity.as_str()).collect::<Vec<_>>().join(", ");
+        let lacks = |what: &str| {
+            format!("it has no {what}, only {}: ferrodrive capture NODE velocity_demand current_demand position", had())
+        };
+        let current = find(&CURRENTS).ok_or_else(|| lacks("current_demand_a and no current_a"))?;
+        let angle = find(&POSITIONS);
+        let motion = angle.or_else(|| find(&SPEEDS)).ok_or_else(|| lacks("position_deg and no velocity_rpm"))?;
+        Ok(Self { current, motion, is_angle: angle.is_some(), set_point: find(&SET_POINTS) })
+    }
+
+    fn all(&self) -> impl Iterator<Item = (&'a Trace, f64)> {
+        [self.current, self.motion].into_iter().chain(self.set_point)
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.all().map(|(trace, _)| trace.quantity.clone()).collect()
+    }
+
+    /// The longest stretch of rows that have all of them without a gap, and what was left out.
+    fn samples(&self, capture: &Capture) -> Result<(Samples, Vec<String>), String> {
+        let whole = |row: &usize| self.all().all(|(trace, _)| trace.values[*row].is_finite());
+        let rows: Vec<usize> = (0..capture.time_s.len()).filter(whole).collect();
+        let distance = |pair: &[usize]| capture.time_s[pair[1]] - capture.time_s[pair[0]];
+        // Over two rows: a host that is late sends the next one early.
+        let mut distances: Vec<f64> =
+            rows.windows(3).map(|three| 0.5 * (distance(&three[..2]) + distance(&three[1..]))).collect();
+        distances.sort_by(f64::total_cmp);
+        let Some(period_s) = distances.get(distances.len() / 2).copied() else {
+            return Err(format!("no three rows have all of {}: capture them at one rate", self.names().join(", ")));
+        };
+        let stretches = rows.chunk_by(|a, b| capture.time_s[*b] - capture.time_s[*a] < GAP * period_s);
+        let used = stretches.max_by_key(|stretch| stretch.len()).unwrap_or_default();
+        let off = used.windows(2).map(|pair| (distance(pair) - period_s).abs()).fold(0.0, f64::max);
+        if off > EVEN * period_s {
+            let (off, period) = (off * 1e3, period_s * 1e3);
+            return Err(format!(
+                "its rows are not evenly spaced: {period:.3} ms apart, and {off:.3} ms more or less; capture by SYNC, --rate 1ms"
+            ));
+        }
+        let mut samples = Samples { period_s, ..Samples::default() };
+        let values = |(trace, worth): (&Trace, f64)| used.iter().map(|row| trace.values[*row] * worth).collect();
+        samples.current_a = values(self.current);
+        samples.position_rad = values(self.motion);
+        if !self.is_angle {
+            let mut angle = 0.0;
+            let mut before = samples.position_rad.first().copied().unwrap_or_default();
+            for value in &mut samples.position_rad {
+                let speed = std::mem::replace(&mut before, *value);
+                angle += 0.5 * (speed + *value) * period_s;
+                *value = angle;
+            }
+        }
+        samples.set_point_rad_s = self.set_point.map(values).unwrap_or_default();
+        let left = capture.time_s.len() - used.len();
+        let note = format!("{} of {} rows were used: the longest stretch without a gap", used.len(), used.len() + left);
+        Ok((samples, (left > 0).then_some(note).into_iter().collect()))
+    }
+}
+
+fn picture(capture: &Capture, response: &Response, found: &Mechanics) -> Poster {
+    let bode: Figure = tune::bode("Frequency response", response, Some(found));
+    let title = if capture.name.is_empty() { format!("node {}", capture.place) } else { capture.name.clone() };
+    Poster { title, subtitle: "captured, and the model".to_owned(), rows: vec![vec![bode]] }
+}
