@@ -1,8 +1,9 @@
 //! What every command prints with `--json` is as docs/json.schema.json says, and docs/json.md names it.
 
+use std::f64::consts::TAU;
+
 use processes::{Ended, Simulator, ferrodrive, page, scratch};
 use serde_json::{Value, json};
-use std::f64::consts::TAU;
 
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");
 
