@@ -1,14 +1,17 @@
 //! What stands on the wire, over random frames: TIME, EMCY, boot-up and heartbeat, answers to guarding, COB-IDs and the identifiers of the
-//! predefined connection set. The layouts are those of CiA 301, written down once more. SDO, LSS, SYNC, NMT and MPDO have theirs beside
-//! their types.
+//! predefined connection set, NMT, MPDO, SDO block transfer. The layouts are those of CiA 301, written down once more. SDO, LSS and SYNC
+//! have theirs beside their types.
 
 use can::{CanId, Frame, Instant};
 use canopen::connection_set::Service;
 use canopen::emcy::Emcy;
 use canopen::guarding::Guarding;
 use canopen::heartbeat::Heartbeat;
+use canopen::nmt::{MalformedNmt, NmtRequest};
+use canopen::pdo::{AddressMode, Mpdo};
+use canopen::sdo::block::wire::{Acknowledgement, End, Reply, Request, Segment};
 use canopen::time_stamp::TimeOfDay;
-use canopen::{CobId, NmtState, NodeId};
+use canopen::{CobId, Mux, NmtState, NodeId};
 
 use super::any_device::device::Numbers;
 
@@ -126,5 +129,131 @@ fn an_identifier_of_the_predefined_connection_set_names_its_service_and_that_its
             assert_eq!(service.can_id(), Some(id), "{raw:03X}h: {service:?}");
         }
         assert_eq!(Service::of(CanId::extended(raw.into())), None, "{raw:03X}h of 29 bits");
+    }
+}
+
+/// CiA 301, 7.2.8.3.1.1: identifier 0, a command specifier of five, a node-ID of 1 to 127 or 0 for all.
+#[test]
+fn a_request_of_the_nmt_master_is_a_command_and_a_node_id() {
+    let mut read = 0;
+    for frame in frames(6, |_| 0) {
+        // Half of them have a command that is defined.
+        let mut data = frame.data().to_vec();
+        if let Some(first) = data.first_mut().filter(|first| **first < 0x80 || frame.is_remote()) {
+            *first = [0x01, 0x02, 0x80, 0x81, 0x82][usize::from(*first) % 5];
+        }
+        let frame = if frame.is_remote() { frame } else { Frame::new(frame.id(), &data) };
+        let expected = if frame.id() != CanId::standard(0) || frame.is_remote() {
+            Err(MalformedNmt::OtherFrame)
+        } else {
+            match *data {
+                [] | [_] => Err(MalformedNmt::TooShort { dlc: data.len() as u8 }),
+                [0x01 | 0x02 | 0x80..=0x82, node @ 0x80..=0xFF, ..] => Err(MalformedNmt::NoSuchNode(node)),
+                [0x01 | 0x02 | 0x80..=0x82, ..] => Ok(()),
+                [code, ..] => Err(MalformedNmt::UnknownCommand(code)),
+            }
+        };
+        let parsed = NmtRequest::parse(&frame);
+        assert_eq!(parsed.map(|_| ()), expected, "{frame}");
+        let Ok(request) = parsed else { continue };
+        assert_eq!(request.emit(), Frame::new(frame.id(), &data[..2]), "{frame}");
+        let meant = (1..=127).filter(|node| request.target.includes(NodeId::new(*node).unwrap())).collect::<Vec<u8>>();
+        assert_eq!(meant, if data[1] == 0 { (1..=127).collect() } else { vec![data[1]] }, "{frame}");
+        read += 1;
+    }
+    assert!(read > ROUNDS / 10, "{read}");
+}
+
+/// CiA 301, 7.2.2.5: bit 7 says whose object it is, bits 0 to 6 the node, then the multiplexor and four bytes.
+#[test]
+fn an_mpdo_is_a_node_a_multiplexor_and_four_bytes() {
+    let mut read = 0;
+    for frame in frames(7, |raw| 0x180 + raw % 0x400) {
+        let Some(mpdo) = Mpdo::parse(&frame) else {
+            assert_ne!(frame.data().len(), 8, "{frame}");
+            continue;
+        };
+        let [address, low, high, sub_index, data @ ..] = <[u8; 8]>::try_from(frame.data()).unwrap();
+        let mode = if address < 0x80 { AddressMode::Source } else { AddressMode::Destination };
+        assert_eq!((mpdo.mode, mpdo.node), (mode, address % 0x80), "{frame}");
+        assert_eq!(mpdo.object, Mux::new(u16::from(low) + 256 * u16::from(high), sub_index), "{frame}");
+        assert_eq!(mpdo.data, data, "{frame}");
+        assert_eq!(mpdo.emit(frame.id()), frame);
+        read += 1;
+    }
+    assert!(read > ROUNDS / 20, "{read}");
+}
+
+/// Eight random bytes whose first is a request or a reply of block transfer: 5 and 6 in bits 5 to 7.
+fn block_frames(seed: u64) -> impl Iterator<Item = [u8; 8]> {
+    let mut numbers = Numbers(seed);
+    (0..ROUNDS).map(move |_| {
+        let mut raw = numbers.next().to_le_bytes();
+        raw[0] = [5, 6][numbers.below(2)] << 5 | raw[0] & 0x1F;
+        raw
+    })
+}
+
+/// The bytes of a number, the lowest first.
+fn number(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte))
+}
+
+/// CiA 301, 7.2.4.3.9 to 7.2.4.3.15, the client's: ccs 6 downloads and 5 uploads; bit 2 is cc, bit 1 of a download s.
+#[test]
+fn requests_of_a_block_transfer_have_the_fields_of_the_standard() {
+    for raw in block_frames(8) {
+        let mux = Mux::new(number(&raw[1..3]) as u16, raw[3]);
+        let bit = |n: u8| raw[0] >> n & 1 == 1;
+        let expected = match (raw[0] >> 5, raw[0] & 3) {
+            (6, 0 | 2) => {
+                Request::InitiateDownload { mux, checksum: bit(2), size: bit(1).then_some(number(&raw[4..])) }
+            }
+            (6, _) => Request::EndDownload(End { unused: raw[0] >> 2 & 7, checksum: number(&raw[1..3]) as u16 }),
+            (5, 0) => Request::InitiateUpload { mux, checksum: bit(2), block_size: raw[4], switch_threshold: raw[5] },
+            (5, 1) => Request::EndUpload,
+            (5, 2) => Request::Acknowledge(Acknowledgement { sequence: raw[1], block_size: raw[2] }),
+            _ => Request::StartUpload,
+        };
+        assert_eq!(Request::parse(&raw), Some(expected), "{raw:02X?}");
+        assert_eq!(Request::parse(&expected.emit()), Some(expected), "{raw:02X?}");
+    }
+}
+
+/// The server's: scs 5 downloads and 6 uploads; bit 2 is sc, bit 1 of an upload s.
+#[test]
+fn replies_of_a_block_transfer_have_the_fields_of_the_standard() {
+    for raw in block_frames(9) {
+        let mux = Mux::new(number(&raw[1..3]) as u16, raw[3]);
+        let bit = |n: u8| raw[0] >> n & 1 == 1;
+        let expected = match (raw[0] >> 5, raw[0] & 3) {
+            (5, 0) => Some(Reply::InitiateDownload { mux, checksum: bit(2), block_size: raw[4] }),
+            (5, 1) => Some(Reply::EndDownload),
+            (5, 2) => Some(Reply::Acknowledge(Acknowledgement { sequence: raw[1], block_size: raw[2] })),
+            // Not defined.
+            (5, _) => None,
+            (_, 0 | 2) => {
+                let size = bit(1).then_some(number(&raw[4..]));
+                Some(Reply::InitiateUpload { mux, checksum: bit(2), size })
+            }
+            _ => Some(Reply::EndUpload(End { unused: raw[0] >> 2 & 7, checksum: number(&raw[1..3]) as u16 })),
+        };
+        assert_eq!(Reply::parse(&raw), expected, "{raw:02X?}");
+        if let Some(reply) = expected {
+            assert_eq!(Reply::parse(&reply.emit()), Some(reply), "{raw:02X?}");
+        }
+    }
+}
+
+/// CiA 301, 7.2.4.3.10: bit 7 is c, bits 0 to 6 the number, then seven bytes.
+#[test]
+fn a_segment_of_a_block_is_a_number_a_flag_and_seven_bytes() {
+    let mut numbers = Numbers(10);
+    for _ in 0..ROUNDS {
+        let raw = numbers.next().to_le_bytes();
+        let segment = Segment::parse(&raw);
+        assert_eq!((segment.last, segment.sequence), (raw[0] >= 0x80, raw[0] % 0x80), "{raw:02X?}");
+        assert_eq!(segment.bytes, raw[1..], "{raw:02X?}");
+        assert_eq!(segment.emit(), raw);
     }
 }

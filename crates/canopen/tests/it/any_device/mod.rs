@@ -8,6 +8,7 @@ mod blocks_over_a_bad_wire;
 mod channels;
 mod channels_over_a_bad_wire;
 pub(crate) mod device;
+mod giving_up;
 mod long_values;
 mod many_pdos;
 mod model;
