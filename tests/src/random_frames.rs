@@ -1,22 +1,28 @@
 //! Random frames against every kind of node: each virtual drive, the servo of CiA 402, inputs and outputs of CiA 401, an encoder of
-//! CiA 406, and a device whose file has every service of CiA 301 that a described device acts on.
+//! CiA 406, and a device whose file has every service of CiA 301 that a described device acts on. Now and then an SDO block transfer or a
+//! program download goes on as a client's would, so that what is random meets each state of it.
 //!
 //! `cargo run -p ferrodrive-tests --example random_frames -- 10000000` does it for as many frames as are said; a short form
 //! is among the tests.
 
+use std::collections::VecDeque;
+
 use can::{Bitrate, CanId, Frame, Instant};
 use canopen::NodeId;
 use canopen::od::Entry;
+use canopen::sdo::block::checksum;
 use devices::{AxisId, Description};
 use sim::VirtualDrive;
 use sim::machine::{Order, models, order};
 
 use crate::seeded::Seeded;
-use crate::sheet::{SheetRow, U8, U16, U32, U64, sheet};
+use crate::sheet::{DOMAIN, SheetRow, U8, U16, U32, U64, sheet};
 
 /// After so many frames a node is replaced by another of its kind: LSS or a write may have taken it out of hearing.
 const FRAMES_OF_A_NODE: u64 = 5_000;
 const NODE: u8 = 5;
+/// Where the second SDO server of `everything` listens, by 1201h.
+const SECOND_SERVER: u16 = 0x645;
 /// What one call may leave to be sent: every TPDO, EMCY, and a frame of each other service.
 const MOST_AT_ONCE: usize = 64;
 
@@ -63,6 +69,7 @@ fn one_node(model: &'static Description, count: u64, seeded: &mut Seeded, seen: 
     let mut drive = order(model, &Order::new(model, node, Bitrate::M1)).expect("as delivered");
     let mut now = Instant::ZERO;
     drive.apply(AxisId::FIRST, &"power on".parse().expect("a stimulus"), now).expect("every machine has a supply");
+    let mut coming = VecDeque::new();
     for _ in 0..count {
         // A frame of 130 bits at 1 Mbit/s, and now and then a pause.
         let pause_us = if seeded.below(200) == 0 { 5_000 } else { 130 };
@@ -72,7 +79,12 @@ fn one_node(model: &'static Description, count: u64, seeded: &mut Seeded, seen: 
             take(&mut *drive, due, seen);
         }
         drive.advance(now);
-        let frame = frame(seeded, model.dictionary.rows());
+        if coming.is_empty() && seeded.below(50) == 0 {
+            coming = transfer(seeded, model.dictionary.rows());
+        }
+        // One of ten is lost in favour of another frame.
+        let next = coming.pop_front().filter(|_| seeded.below(10) > 0);
+        let frame = next.unwrap_or_else(|| frame(seeded, model.dictionary.rows()));
         seen.frames += 1;
         drive.handle_frame(&frame, now);
         take(&mut *drive, now, seen);
@@ -117,10 +129,60 @@ fn frame(seeded: &mut Seeded, rows: &[Entry]) -> Frame {
     }
 }
 
+/// The frames of an SDO client that transfers in blocks: an upload, a download, or a program (CiA 302-3: stop, clear, data, start).
+fn transfer(seeded: &mut Seeded, rows: &[Entry]) -> VecDeque<Frame> {
+    let row = &rows[seeded.below(rows.len())];
+    // The second SDO server, where the node has it, or the default one.
+    let id = if seeded.below(4) == 0 { SECOND_SERVER } else { 0x600 + u16::from(NODE) };
+    let mut requests = VecDeque::new();
+    match seeded.below(3) {
+        0 => {
+            let block_size = 1 + seeded.below(127) as u8;
+            requests.push_back(initiate(0xA4, (row.index, row.sub_index), u32::from(block_size)));
+            requests.push_back([0xA3, 0, 0, 0, 0, 0, 0, 0]);
+            requests.extend((0..3).map(|_| [0xA2, seeded.below(128) as u8, block_size, 0, 0, 0, 0, 0]));
+            requests.push_back([0xA1, 0, 0, 0, 0, 0, 0, 0]);
+        }
+        1 => requests.extend(download(seeded, (row.index, row.sub_index))),
+        _ => {
+            let control = |command| initiate(0x2F, (0x1F51, 1), command);
+            requests.extend([control(0), control(3)]);
+            requests.extend(download(seeded, (0x1F50, 1)));
+            requests.push_back(control(1));
+        }
+    }
+    requests.iter().map(|raw| Frame::new(CanId::standard(id), raw)).collect()
+}
+
+fn initiate(command: u8, (index, sub_index): (u16, u8), data: u32) -> [u8; 8] {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), data.to_le_bytes());
+    [command, low, high, sub_index, a, b, c, d]
+}
+
+/// A download in one block, its size and its checksum right as a rule.
+fn download(seeded: &mut Seeded, object: (u16, u8)) -> Vec<[u8; 8]> {
+    let data: Vec<u8> = (0..seeded.below(60)).map(|_| seeded.bits() as u8).collect();
+    let size = data.len() as u32 + u32::from(seeded.below(10) == 0);
+    let mut requests = vec![initiate(0xC6, object, size)];
+    let segments = data.chunks(7).len();
+    for (number, bytes) in data.chunks(7).enumerate() {
+        let last = if number + 1 == segments { 0x80 } else { 0 };
+        let mut raw = [number as u8 + 1 | last, 0, 0, 0, 0, 0, 0, 0];
+        raw[1..=bytes.len()].copy_from_slice(bytes);
+        requests.push(raw);
+    }
+    let unused = (7 - data.len() % 7) % 7;
+    let [low, high] = (checksum(0, &data) ^ u16::from(seeded.below(10) == 0)).to_le_bytes();
+    requests.push([0xC1 | (unused as u8) << 2, low, high, 0, 0, 0, 0, 0]);
+    requests
+}
+
 /// An SDO request about an object that is there, as a rule.
 fn request(seeded: &mut Seeded, rows: &[Entry]) -> [u8; 8] {
-    const COMMANDS: [u8; 18] =
-        [0x40, 0x40, 0x2F, 0x2F, 0x2B, 0x2B, 0x27, 0x23, 0x23, 0x22, 0x21, 0x20, 0x60, 0x70, 0x00, 0x0D, 0x80, 0xA4];
+    const COMMANDS: [u8; 22] = [
+        0x40, 0x40, 0x2F, 0x2F, 0x2B, 0x2B, 0x27, 0x23, 0x23, 0x22, 0x21, 0x20, 0x60, 0x70, 0x00, 0x0D, 0x80, 0xA4,
+        0xA3, 0xA2, 0xC6, 0xC1,
+    ];
     let row = &rows[seeded.below(rows.len())];
     let [low, high] = row.index.to_le_bytes();
     let mut data = seeded.bits().to_le_bytes();
@@ -166,6 +228,16 @@ fn everything() -> Vec<u8> {
     ] {
         rows.push((index, 0, U8, "ro", u64::from(entries), false));
         rows.extend((1..=entries).map(|sub_index| (index, sub_index, data_type, "rw", default, false)));
+    }
+    rows.push((0x1201, 0, U8, "ro", 3, false));
+    rows.extend(
+        [(1, U32, 0x645), (2, U32, 0x5C5), (3, U8, 0)].map(|(sub, of, value)| (0x1201, sub, of, "rw", value, false)),
+    );
+    for (index, data_type, access) in
+        [(0x1F50, DOMAIN, "rw"), (0x1F51, U8, "rw"), (0x1F56, U32, "ro"), (0x1F57, U32, "ro")]
+    {
+        rows.push((index, 0, U8, "ro", 1, false));
+        rows.push((index, 1, data_type, access, 0, false));
     }
     for (n, (transmission_type, mapped)) in [(255, 2), (1, 3), (255, 0xFF), (255, 0xFE)].into_iter().enumerate() {
         pdo(&mut rows, [0x1400, 0x1600], n as u16, 0x205, transmission_type, mapped, 0x6200_0108);

@@ -9,6 +9,8 @@ pub const U8: u16 = 5;
 pub const U16: u16 = 6;
 /// UNSIGNED32.
 pub const U32: u16 = 7;
+/// DOMAIN.
+pub const DOMAIN: u16 = 0xF;
 /// UNSIGNED64.
 pub const U64: u16 = 0x1B;
 

@@ -4,6 +4,8 @@
 //! says, index pulses at whole turns.
 
 use crate::virtual_cia402::bench::{Bench, TURN};
+use devices::servo::CIA402;
+use eds::{Sheet, keep};
 
 const ROWS: &str = include_str!("../../../data/cia402/homing.csv");
 const STARTS: [f64; 5] = [-20.75, -10.3, 2.7, 10.3, 20.75];
@@ -208,4 +210,19 @@ fn halt_interrupts_homing_and_it_goes_on() {
     assert!(!bench.has(0x1000));
     bench.control(0x1F);
     assert!(bench.run_until(20_000, |bench| bench.has(0x1400)).is_some(), "{:04X}", bench.status());
+}
+
+/// Makers leave the default of 6502h open: what such a device can do is what its other objects are for.
+#[test]
+fn a_servo_whose_file_leaves_the_supported_modes_open_is_homed() {
+    let mut file = Sheet::of(&CIA402).eds();
+    let supported = file.objects.iter_mut().find(|object| object.index == 0x6502).unwrap();
+    supported.variables[0].default = None;
+    let mut bench = Bench::of(keep(&file).unwrap());
+    bench.write(0x6098, 0, 37).unwrap();
+    bench.enable(6);
+    assert_eq!(bench.read(0x6061, 0), 6);
+    bench.control(0x1F);
+    assert!(bench.run_until(1_000, |bench| bench.has(0x1400)).is_some(), "{:04X}", bench.status());
+    assert_eq!(bench.position(), 0);
 }

@@ -20,7 +20,8 @@ const MOST: u64 = 1 << 20;
 ///
 /// Stops and clears the program (1F51h), sends the file (1F50h), reads back what the node says of it (1F56h and 1F57h), and starts
 /// it. A program that is there already by its identification is not sent again, so that the same command goes on where several nodes
-/// were to get it. A drive whose motor has power is refused.
+/// were to get it. SDO has no place to go on from in the midst of a value: after a cut the same command clears the program and sends
+/// all of it, and until then the node starts none. A drive whose motor has power is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 program 5 firmware.bin\n  \
     ferrodrive --bus can0 program 5 bootable.hex --number 2 --json")]
