@@ -13,7 +13,7 @@ use sim::machine::{Order, Realism, mjoint, order as order_of, zlac8030l, zlim42c
 use sim::{CoupledShaft, Coupling, Fidelity, Place, StationId, VirtualDrive, World};
 
 /// Names of the worlds.
-pub(crate) const WORLDS: [&str; 23] = [
+pub(crate) const WORLDS: [&str; 25] = [
     "1 hub servo turning, silent bus",
     "1 hub servo turning, busy bus",
     "1 hub servo not enabled",
@@ -37,6 +37,8 @@ pub(crate) const WORLDS: [&str; 23] = [
     "1 mechanical described servo turning, silent bus",
     "127 mechanical hub servos turning, silent bus",
     "1 mechanical hub servo not enabled",
+    "1 mechanical stepper turning, silent bus",
+    "1 mechanical stepper not enabled",
 ];
 
 /// Drives by their node-ID.
@@ -72,6 +74,8 @@ pub(crate) fn world(name: &str) -> Option<World> {
         "1 mechanical described servo turning, silent bus" => turning(mechanical(vec![described(1)])).0,
         "127 mechanical hub servos turning, silent bus" => turning(mechanical(hub_servos(127))).0,
         "1 mechanical hub servo not enabled" => not_enabled(mechanical(hub_servos(1))),
+        "1 mechanical stepper turning, silent bus" => turning(mechanical(vec![stepper(2)])).0,
+        "1 mechanical stepper not enabled" => not_enabled(mechanical(vec![stepper(2)])),
         _ => return None,
     })
 }

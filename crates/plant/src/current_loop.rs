@@ -27,6 +27,12 @@ const SHORT_S: f64 = 50e-6;
 pub(crate) fn short_steps(dt_s: f64) -> u32 {
     ((dt_s / SHORT_S + 0.5) as u32).max(1)
 }
+
+/// Whether a step is a long one.
+pub(crate) fn is_long(dt_s: f64) -> bool {
+    dt_s > 1.5 * SHORT_S
+}
+
 /// Relative change of the winding's resistance at which its closed form is made anew.
 const RESISTANCE_STEP: f64 = 1e-4;
 /// Terms of the series, which is summed for matrices of a norm up to a quarter: what is left out is below `0.25^9 / 11!`.

@@ -40,6 +40,7 @@ pub mod cogging;
 pub mod coupled;
 pub mod current_loop;
 pub mod encoder;
+pub mod field_loop;
 pub mod free_run;
 pub mod gear;
 pub mod hall;
@@ -64,6 +65,7 @@ mod joining;
 mod joint_motors;
 mod regulated;
 mod servo_motors;
+mod stepper_long;
 mod stepper_motors;
 
 pub use angle::Angle;

@@ -5,10 +5,11 @@
 //! the temperatures, the winding's resistance and the energies. The load, the source and the surroundings are plain
 //! fields that a test or a person at a bench changes at any time. What the load does to the shaft is the composition's.
 
+use crate::current_loop::short_steps;
 use crate::flows::Flows;
 use crate::mechanics::Load;
 use crate::shaft::{Attached, Coupled};
-use crate::supply::{SupplyData, SupplyModel};
+use crate::supply::{SupplyData, SupplyModel, SupplyOutput};
 use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 
 /// Steps between two looks at the slow things: heat, resistance, and the exact direction of the magnets. Bodies are
@@ -168,6 +169,44 @@ impl Rig {
         self.energy.consumption_j += bus.consumption_j;
 
         self.slow.steps += 1;
+        self.slow.time_s += dt_s;
+        self.slow.steps >= self.slow_every
+    }
+
+    /// The same of a step of a supervision period, whose flows are means of it; `beside_w` is what else draws from the bus, by its
+    /// voltage, and becomes heat of the switches. The bus goes in control periods, unless its source has it where it stays.
+    pub(crate) fn step_long(
+        &mut self,
+        model: &RigModel,
+        dt_s: f64,
+        flows: &Flows,
+        beside_w: impl Fn(f64) -> f64,
+    ) -> bool {
+        let nothing_beside = beside_w(self.supply.bus_v) == 0.0;
+        let quiet = if nothing_beside { model.supply.follow(&mut self.supply, dt_s, flows.bus_w) } else { None };
+        let mut arc_j = flows.arc_j;
+        let bus = quiet.unwrap_or_else(|| {
+            let mut sum = SupplyOutput::default();
+            let steps = short_steps(dt_s);
+            let short_s = dt_s / f64::from(steps);
+            for _ in 0..steps {
+                let beside_w = beside_w(self.supply.bus_v);
+                arc_j += beside_w * short_s;
+                let bus = model.supply.step(&mut self.supply, short_s, flows.bus_w + beside_w, false);
+                sum.source_j += bus.source_j;
+                sum.consumption_j += bus.consumption_j;
+            }
+            sum
+        });
+        self.energy.source_j += bus.source_j;
+        self.energy.winding_j += flows.heat_w_per_ohm * self.winding_ohm * dt_s;
+        self.energy.switches_j += flows.heat_w_per_ohm * model.switch_resistance_ohm * dt_s + arc_j;
+        self.energy.friction_j += flows.friction_j;
+        self.energy.load_j += flows.load_j;
+        self.energy.consumption_j += bus.consumption_j;
+
+        // Heat shows within a millisecond or two.
+        self.slow.steps += self.slow_every / SLOW_EVERY_LONG;
         self.slow.time_s += dt_s;
         self.slow.steps >= self.slow_every
     }

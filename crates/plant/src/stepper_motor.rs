@@ -15,6 +15,8 @@
 
 use crate::angle::{Angle, Axis};
 use crate::clamp::ClampModel;
+use crate::current_loop::is_long;
+use crate::field_loop::{Expected, FieldData};
 use crate::flows::Flows;
 use crate::mechanics::{RotorData, RotorModel};
 use crate::motor::{self, Motor};
@@ -83,10 +85,15 @@ pub struct StepperMotor {
     pub rig: Rig,
     /// Torque of the motor on its rotor, detent included, mean over the last step.
     pub torque_nm: f64,
+    /// The current loop, where the power stage follows by itself ([`follow_long`](Self::follow_long)).
+    pub field: FieldData,
+    /// The longest current vector in the last step of such a power stage.
+    pub(crate) largest_a: Option<f64>,
+    pub(crate) expected: Expected,
     seized: bool,
     overheated: bool,
-    axis: Axis,
-    bus_current_a: f64,
+    pub(crate) axis: Axis,
+    pub(crate) bus_current_a: f64,
     /// Current through the contact of two wires.
     short_a: f64,
 }
@@ -103,6 +110,9 @@ impl StepperMotor {
             broken_down: false,
             rig: Rig::new(&model.rig, model.stepper.resistance_ohm, source_v, ambient_c),
             torque_nm: 0.0,
+            field: FieldData::default(),
+            largest_a: None,
+            expected: Expected::default(),
             seized: false,
             overheated: false,
             axis: magnet_axis(&model, angle),
@@ -128,7 +138,7 @@ impl StepperMotor {
 
     /// Windings, with what is broken and what the suppressors take: the torque on the rotor and where the energy went.
     #[inline(always)]
-    fn drive(&mut self, dt_s: f64, bridges: &Bridges, turn: Turn) -> (f64, Flows) {
+    pub(crate) fn drive(&mut self, dt_s: f64, bridges: &Bridges, turn: Turn) -> (f64, Flows) {
         let bus_v = self.rig.supply.bus_v;
         let broken_w = self.broken_w(bridges, bus_v);
         let model = &self.model;
@@ -177,6 +187,12 @@ impl StepperMotor {
         let turn_rad = dt_s * f64::from(self.model.stepper.teeth) * turned.mean_rad_s;
         self.axis = self.axis.turned_by(Axis::at_small_rad(turn_rad));
         (flows.friction_j, flows.load_j) = (turned.friction_j, turned.load_j);
+        if is_long(dt_s) {
+            if self.rig.is_coupled() {
+                self.give(&mut flows, turned.mean_rad_s, dt_s);
+            }
+            return self.book_long(dt_s, flows);
+        }
         self.book(dt_s, flows);
     }
 
@@ -184,12 +200,18 @@ impl StepperMotor {
     #[inline(always)]
     fn book(&mut self, dt_s: f64, mut flows: Flows) {
         if self.rotor.velocity_rad_s.abs() > self.model.bearing_limit_rad_s {
-            self.seized = true;
-            flows.friction_j += self.rig.seize(&self.model.rotor, &mut self.rotor);
+            flows.friction_j += self.seize();
         }
         if self.rig.step(&self.model.rig, dt_s, &flows, false) {
             self.step_slow();
         }
+    }
+
+    /// The bearings seize. What that takes from the moving masses.
+    #[cold]
+    pub(crate) fn seize(&mut self) -> f64 {
+        self.seized = true;
+        self.rig.seize(&self.model.rotor, &mut self.rotor)
     }
 
     /// Blocks the rotor, or frees it; seized bearings are new ones then.
@@ -229,12 +251,17 @@ impl StepperMotor {
             _ => 0.0,
         };
         self.short_a = short_v / (SHORT_OHM + self.model.rig.switch_resistance_ohm);
-        let breakdown_w = if self.broken_down { bus_v * bus_v / BREAKDOWN_OHM } else { 0.0 };
-        short_v * self.short_a + breakdown_w
+        short_v * self.short_a + Self::breakdown_w(self.broken_down, bus_v)
+    }
+
+    /// What a transistor takes from the bus that has broken down.
+    #[inline]
+    pub(crate) fn breakdown_w(broken_down: bool, bus_v: f64) -> f64 {
+        if broken_down { bus_v * bus_v / BREAKDOWN_OHM } else { 0.0 }
     }
 
     /// Heat of the last steps into the bodies, the windings' resistance, and the magnets' direction afresh.
-    fn step_slow(&mut self) {
+    pub(crate) fn step_slow(&mut self) {
         self.rig.step_slow(&self.model.rig, self.model.stepper.resistance_ohm);
         let board = &self.rig.heat_sink;
         if board.hold_c.is_none() && board.temperature_c > self.model.power_stage_limit_c && !self.broken_down {
@@ -257,6 +284,11 @@ impl StepperMotor {
             winding_c: reading_c(self.rig.winding.temperature_c),
             heat_sink_c: reading_c(self.rig.heat_sink.temperature_c),
         }
+    }
+
+    /// The longest current vector in the last step of a power stage that follows by itself.
+    pub fn largest_current_a(&self) -> Option<f64> {
+        self.largest_a
     }
 
     /// Energy stored now: in motion, in the windings' field, in the detent and in the bus capacitor.

@@ -160,6 +160,36 @@ impl SupplyModel {
         SupplyOutput { source_j, consumption_j, bleeder_j }
     }
 
+    /// One step, of any length, of a bus that is where its source holds it or on the way there: the capacitor by the closed form,
+    /// about the voltage at which the source gives what is taken. `None`, and nothing has changed, where the source does not
+    /// conduct, or cannot give as much.
+    #[inline]
+    pub(crate) fn follow(&self, data: &mut SupplyData, dt_s: f64, load_w: f64) -> Option<SupplyOutput> {
+        let before = data.bus_v;
+        let taken_w = load_w + self.consumption_w;
+        let drop_v2 = 4.0 * self.source_resistance_ohm * taken_w;
+        let free_v2 = data.source_v * data.source_v - drop_v2;
+        // At half of its voltage a source gives the most that it can.
+        let gives = data.connected && taken_w >= 0.0 && free_v2 > 0.0 && before <= data.source_v;
+        if !gives || before <= self.consumption_from_v {
+            return None;
+        }
+        let held_v = 0.5 * (data.source_v + libm::sqrt(free_v2));
+        let least_v = data.source_v - self.source_limit_a * self.source_resistance_ohm;
+        if held_v < least_v || before < least_v || held_v <= self.consumption_from_v {
+            return None;
+        }
+        let lag_s = self.source_resistance_ohm * self.bus_capacitance_f(data);
+        let left = if dt_s > 20.0 * lag_s { 0.0 } else { libm::exp(-dt_s / lag_s) };
+        data.bus_v = held_v + (before - held_v) * left;
+        let stored_j = 0.5 * self.bus_capacitance_f(data) * (data.bus_v - before) * (data.bus_v + before);
+        if data.bleeder_load != 0.0 {
+            self.warm_bleeder(data, dt_s, 0.0);
+        }
+        let consumption_j = self.consumption_w * dt_s;
+        Some(SupplyOutput { source_j: load_w * dt_s + consumption_j + stored_j, consumption_j, bleeder_j: 0.0 })
+    }
+
     /// What draws from a bus on which the drive's converter is off.
     #[cold]
     fn residual_w(&self, bus_v: f64) -> f64 {
@@ -311,6 +341,33 @@ mod tests {
             assert!((data.bus_v - expected_v).abs() < 2e-2 * expected_v, "{load_ohm} ohm: {} V", data.bus_v);
             let stored = limited.stored_energy_j(&data) - stored_j;
             assert!((energy_j - stored).abs() < 1e-9, "{load_ohm} ohm: {energy_j} J came, {stored} J are there");
+        }
+    }
+
+    #[test]
+    fn one_long_step_of_a_stiff_bus_is_what_many_short_ones_are_and_what_is_too_much_for_it_is_refused() {
+        let stiff = SupplyModel { capacitance_f: 220e-6, consumption_w: 1.0, source_limit_a: 7.8, ..SUPPLY };
+        for (from_v, load_w) in [(24.0, 40.0), (23.3, 5.0), (23.5, 0.0)] {
+            let begun = SupplyData { bus_v: from_v, ..SupplyData::charged(24.0) };
+            let (mut long, mut short, mut source_j) = (begun, begun, 0.0);
+            let out = stiff.follow(&mut long, 0.5e-3, load_w).expect("the source holds it");
+            for _ in 0..5000 {
+                source_j += stiff.step(&mut short, 0.1e-6, load_w, false).source_j;
+            }
+            assert!((long.bus_v - short.bus_v).abs() < 1e-6, "{load_w} W: {} and {} V", long.bus_v, short.bus_v);
+            assert!((out.source_j - source_j).abs() < 1e-6, "{load_w} W: {} and {source_j} J", out.source_j);
+        }
+        // Beyond the limit of the source, fed back, above its voltage, and without it.
+        let charged = SupplyData::charged(24.0);
+        let refused = [
+            (charged, 300.0),
+            (charged, -10.0),
+            (SupplyData { bus_v: 30.0, ..charged }, 10.0),
+            (SupplyData { connected: false, ..charged }, 10.0),
+        ];
+        for (mut data, load_w) in refused {
+            let before = data;
+            assert_eq!((stiff.follow(&mut data, 0.5e-3, load_w), data), (None, before));
         }
     }
 

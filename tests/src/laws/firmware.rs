@@ -94,13 +94,14 @@ impl Subject for zlim42c::Zlim42c {
             reference_v: if has(4) { 0.0 } else { zlim42c::assumptions::REFERENCE_V },
             inputs: [has(0), has(1), has(5), has(6)],
             eeprom_ok: !has(7),
+            ..Default::default()
         }
     }
 
     fn is_possible(actuation: &Self::Actuation) -> bool {
         match actuation.power_stage {
             zlim42c::hardware::PowerStage::Modulate { duty } => duty.iter().all(|share| share.abs() <= 1.0),
-            zlim42c::hardware::PowerStage::Off => true,
+            _ => true,
         }
     }
 }

@@ -20,6 +20,9 @@ pub struct Sensors {
     pub inputs: [bool; 4],
     /// The EEPROM answers.
     pub eeprom_ok: bool,
+    /// The longest current vector since the last tick, A, of a power stage that follows by itself
+    /// ([`Fidelity::Mechanical`](crate::Fidelity)): what a phase carries as it turns.
+    pub largest_a: Option<f32>,
 }
 
 impl Default for Sensors {
@@ -32,6 +35,7 @@ impl Default for Sensors {
             reference_v: super::assumptions::REFERENCE_V,
             inputs: [false; 4],
             eeprom_ok: true,
+            largest_a: None,
         }
     }
 }
@@ -47,6 +51,9 @@ pub enum PowerStage {
         /// Duty cycles of A and B.
         duty: [f32; 2],
     },
+    /// Whatever gives the current vector on the way that [`Zlim42c::path`](super::Zlim42c::path) has
+    /// ([`Fidelity::Mechanical`](crate::Fidelity)).
+    Follow,
 }
 
 /// What the drive does until the next control period.

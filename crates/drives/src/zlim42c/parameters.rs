@@ -8,6 +8,7 @@ use super::objects::*;
 use super::tables::{PEAK_CURRENTS_A, PULSES_PER_TURN, STEP_FREQUENCY_HZ, entry};
 use super::variations::{EMERGENCY_BRAKE, EMERGENCY_COAST};
 use super::{Values, homing};
+use crate::Fidelity;
 use crate::engine::actuator::stepper::{StepperCurrents, StepperGains, StepperModel};
 use crate::engine::axis::{HomingParameters, Ramp, VelocityRamps};
 use crate::engine::cia402::{Parameters as AxisParameters, Tolerances};
@@ -29,15 +30,18 @@ pub(super) struct Parameters {
     pub(super) model: StepperModel,
     pub(super) gains: StepperGains,
     pub(super) currents: StepperCurrents,
+    /// Supervision periods in one of its supervisions.
+    pub(super) supervisions: u16,
 }
 
 impl Parameters {
-    pub(super) fn of(values: &Values, variant: &Variant) -> Self {
-        Self::with_pulses(values, variant, pulses_per_turn(values))
+    pub(super) fn of(values: &Values, variant: &Variant, fidelity: Fidelity) -> Self {
+        Self::with_pulses(values, variant, pulses_per_turn(values), fidelity)
     }
 
     /// The same with another number of pulses in a turn than 2006h has.
-    pub(super) fn with_pulses(values: &Values, variant: &Variant, pulses_per_turn: u16) -> Self {
+    pub(super) fn with_pulses(values: &Values, variant: &Variant, pulses_per_turn: u16, fidelity: Fidelity) -> Self {
+        let supervisions = fidelity.tick(1, MECHANICAL_SUPERVISIONS);
         Self {
             pulses_per_turn,
             pulses_s_per_rpm: f64::from(pulses_per_turn) / 60.0,
@@ -45,7 +49,7 @@ impl Parameters {
             holding: Holding { when_disabled: values.get(SHAFT_LOCK_WHEN_DISABLED) == 1, when_switched_on: true },
             model: StepperModel {
                 pulses_per_electrical_turn: pulses_per_turn / TEETH as u16,
-                periods_per_command: SUPERVISION_DIVIDER,
+                periods_per_command: SUPERVISION_DIVIDER * supervisions as u8,
                 control_period_s: CONTROL_PERIOD_S,
                 detent_a: if pulses_per_turn < DETENT_FROM_PULSES { 0.0 } else { DETENT_CURRENT_A },
                 detent_lead_periods: DETENT_LEAD_PERIODS,
@@ -58,7 +62,8 @@ impl Parameters {
                 modulation_limit: MODULATION_LIMIT,
                 at_limit: AT_LIMIT,
             },
-            currents: currents(values),
+            currents: currents(values, supervisions),
+            supervisions,
         }
     }
 }
@@ -107,10 +112,10 @@ fn emergency_stop(variant: &Variant) -> StopRamp {
 }
 
 /// 2005h while turning; 2007h at standstill: half of it, or all.
-fn currents(values: &Values) -> StepperCurrents {
+fn currents(values: &Values, supervisions: u16) -> StepperCurrents {
     let run_a = entry(&PEAK_CURRENTS_A, values.get(CURRENT_SETTING));
     let hold_a = if values.get(LOCK_CURRENT) == 0 { 0.5 * run_a } else { run_a };
-    StepperCurrents { run_a, hold_a, hold_after: HOLD_AFTER_PERIODS }
+    StepperCurrents { run_a, hold_a, hold_after: HOLD_AFTER_PERIODS / supervisions }
 }
 
 /// Pulses/s by which a planned velocity may miss its target in the last bits.

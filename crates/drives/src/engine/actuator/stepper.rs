@@ -21,6 +21,9 @@
 //! none; so the vector gives way to the swings of the current along it, which are those of the power
 //! ([`AtLimit`]): it falls back while the power rises and runs ahead while it falls.
 //!
+//! A power stage that follows by itself takes the path of the vector in place of duty cycles, once each supervision period
+//! ([`follow`](Stepper::follow)): [`Fidelity::Mechanical`](crate::Fidelity).
+//!
 //! Nothing here measures the rotor: it follows within a quarter of an electrical turn, or slips by whole ones, and the
 //! position knows nothing of it.
 
@@ -91,6 +94,23 @@ pub struct Peaks {
     pub reference_a: [f32; 2],
 }
 
+/// What a power stage is asked for that follows by itself: the vector's path over a supervision period, in electrical turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FieldDemand {
+    /// Where it stands at the beginning, between whole pulses.
+    pub from_turns: f64,
+    /// How far it goes.
+    pub way_turns: f64,
+    /// A whole pulse.
+    pub pulse_turns: f64,
+    /// Length of the current vector, A.
+    pub amplitude_a: f32,
+    /// Amplitude of the current across it that balances the detent, A, and how far ahead that is asked for.
+    pub detent_a: f32,
+    /// See `detent_a`.
+    pub detent_lead_turns: f32,
+}
+
 /// State of the vector and its loops.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stepper {
@@ -112,6 +132,9 @@ pub struct Stepper {
     along_a: Option<[f32; 2]>,
     measured_a: [f32; 2],
     peaks: Peaks,
+    /// What a power stage is asked for that follows by itself, and how far its path is ahead of the last whole pulse.
+    path: FieldDemand,
+    ahead_pulses: f64,
 }
 
 impl Stepper {
@@ -144,7 +167,7 @@ impl Stepper {
     /// The motor is free, the position 0; the vector keeps its direction.
     #[must_use]
     pub fn restarted(&self) -> Self {
-        Self { field: self.field, electrical_turns: self.electrical_turns, ..Self::default() }
+        Self { field: self.field, electrical_turns: self.electrical_turns, path: self.path, ..Self::default() }
     }
 
     /// The zero of the position: what was `by` is 0 from now on. The vector stays where it points.
@@ -231,13 +254,49 @@ impl Stepper {
         duty
     }
 
+    /// The path of the vector over the coming supervision period, for a power stage that follows by itself and carries this current
+    /// now. The control period that a vector is ahead of its time goes on as the period began.
+    #[cold]
+    #[inline(never)]
+    pub fn follow(&mut self, model: &StepperModel, current_a: [f32; 2]) {
+        self.measured_a = current_a;
+        let due = floor(self.ahead_pulses + ROUNDING);
+        self.turn_to(model, self.issued.wrapping_add(due));
+        let begun = self.ahead_pulses - f64::from(due);
+        let end = f64::from(self.to.position.wrapping_sub(self.issued)) + self.to.fraction + self.pulses_per_period;
+        self.ahead_pulses = end;
+        let pulse_turns = 1.0 / f64::from(model.pulses_per_electrical_turn.max(1));
+        let lead = model.detent_lead_periods * (self.pulses_per_period * pulse_turns) as f32;
+        self.path = FieldDemand {
+            from_turns: (f64::from(self.field) + begun) * pulse_turns,
+            way_turns: (end - begun) * pulse_turns,
+            pulse_turns,
+            amplitude_a: self.amplitude_a,
+            detent_a: if self.balances_detent(model, lead) { model.detent_a } else { 0.0 },
+            // What is asked for acts as late as the voltage.
+            detent_lead_turns: lead - VOLTAGE_DELAY_PERIODS * (self.pulses_per_period * pulse_turns) as f32,
+        };
+        // It has no single phases, of which one could be lost.
+        self.peaks = Peaks { current_a: [self.amplitude_a; 2], reference_a: [self.amplitude_a; 2] };
+    }
+
+    /// What a power stage is asked for that follows by itself.
+    pub const fn path(&self) -> &FieldDemand {
+        &self.path
+    }
+
+    #[inline]
+    fn balances_detent(&self, model: &StepperModel, lead_turns: f32) -> bool {
+        !(model.detent_a == 0.0 || self.amplitude_a <= model.detent_a || lead_turns.abs() > 1.0 / 16.0)
+    }
+
     /// Current along the vector and across it, A: across it what balances the detent, along it the rest of the vector's length
     /// (`I cos x` for `I sin x`, to the square of x). Above the speed at which the lead is a quarter of the detent's period
     /// nothing is balanced: the rotor's inertia smooths what comes so often.
     #[inline]
     fn wanted_current_a(&self, model: &StepperModel, angle: f32, per_pulse: f32) -> (f32, f32) {
         let lead = model.detent_lead_periods * self.pulses_per_period as f32 * per_pulse;
-        if model.detent_a == 0.0 || self.amplitude_a <= model.detent_a || lead.abs() > 1.0 / 16.0 {
+        if !self.balances_detent(model, lead) {
             return (self.amplitude_a, 0.0);
         }
         let across_a = model.detent_a * sin_cos_turns(4.0 * (angle + lead)).0;
@@ -271,13 +330,19 @@ impl Stepper {
         (self.d, self.q) = (Pi::default(), Pi::default());
         self.along_a = None;
         self.peaks = Peaks::default();
+        self.ahead_pulses = 0.0;
     }
 
     /// The whole pulses that have come due turn the vector.
     fn step(&mut self, model: &StepperModel) {
         self.period = self.period.saturating_add(1).min(model.periods_per_command);
         let way = self.from.fraction + self.pulses_per_period * f64::from(self.period);
-        let due = self.from.position.wrapping_add(floor(way + ROUNDING));
+        self.turn_to(model, self.from.position.wrapping_add(floor(way + ROUNDING)));
+    }
+
+    /// The pulses up to this position turn the vector.
+    #[inline(always)]
+    fn turn_to(&mut self, model: &StepperModel, due: i32) {
         let pulses = i64::from(due.wrapping_sub(self.issued));
         let turn = i64::from(model.pulses_per_electrical_turn.max(1));
         let field = i64::from(self.field) + pulses;
@@ -308,7 +373,7 @@ fn turned(d: f32, q: f32, (sin, cos): (f32, f32)) -> (f32, f32) {
 
 /// From sampling the currents to the middle of the period in which the voltage acts: duty cycles go through the
 /// timer's shadow registers.
-const VOLTAGE_DELAY_PERIODS: f32 = 1.5;
+pub const VOLTAGE_DELAY_PERIODS: f32 = 1.5;
 
 /// The largest whole number not above `x`, a number of pulses.
 #[inline]

@@ -25,7 +25,7 @@ impl Application<TableStorage> for Zlim42c {
         self.device.restart(node_id, restart::bitrate(&stored), now);
         self.device.values_mut().set(NODE_ID, u16::from(node_id.raw()));
         let (before, mut stepper) = (self.parameters.model, self.stepper.restarted());
-        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone()) };
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone(), self.fidelity) };
         stepper.rescale(before.pulses_per_electrical_turn, self.parameters.model.pulses_per_electrical_turn);
         self.stepper = stepper;
         self.shell.axis.self_test_done();

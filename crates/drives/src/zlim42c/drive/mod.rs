@@ -22,7 +22,7 @@ use super::terminals::{self, TERMINALS};
 use super::variations::VARIANT;
 use super::{Values, led, storage};
 use crate::communication::communication;
-use crate::engine::actuator::stepper::Stepper;
+use crate::engine::actuator::stepper::{FieldDemand, Stepper, StepperGains};
 use crate::engine::axis::{Demand, Feedback};
 use crate::engine::cia402::Targets;
 use crate::engine::device::{Application, Device, ResetTimes};
@@ -30,7 +30,7 @@ use crate::engine::faults::{FaultMonitor, FaultSet};
 use crate::engine::storage::StoredImage;
 use crate::zltech::Shell;
 use crate::zltech::terminals::Conditions;
-use crate::{Firmware, Report};
+use crate::{Fidelity, Firmware, Report};
 use devices::variant::Variant;
 
 /// How this drive communicates.
@@ -40,6 +40,7 @@ pub static NODE_PROFILE: NodeProfile = communication(&devices::zltech::ZLIM42C);
 #[derive(Clone)]
 pub struct Zlim42c {
     device: Device<TableStorage>,
+    fidelity: Fidelity,
     dip_address: u8,
     parameters: Parameters,
     shell: Shell<4>,
@@ -62,14 +63,15 @@ impl Zlim42c {
     /// The same of another variant.
     pub fn of(variant: Variant) -> Self {
         let image = StoredImage::of(&storage::delivered(&variant));
-        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant))
+        Self::over(Device::new(&NODE_PROFILE, Bitrate::K500, image, COMMUNICATION_PERIOD_NS, variant), Fidelity::Full)
     }
 
     /// Motor free, position 0, and the values of `device` in effect.
-    fn over(device: Device<TableStorage>) -> Self {
+    fn over(device: Device<TableStorage>, fidelity: Fidelity) -> Self {
         Self {
-            parameters: Parameters::of(device.values(), device.variant()),
+            parameters: Parameters::of(device.values(), device.variant(), fidelity),
             device,
+            fidelity,
             dip_address: 0,
             shell: Shell::new(),
             stepper: Stepper::default(),
@@ -111,6 +113,16 @@ impl Zlim42c {
         self.stepper.vector_turns(&self.parameters.model)
     }
 
+    /// The way of the current vector until the next tick, for a power stage that follows by itself.
+    pub const fn path(&self) -> &FieldDemand {
+        self.stepper.path()
+    }
+
+    /// How such a power stage is set.
+    pub const fn current_gains(&self) -> &StepperGains {
+        &self.parameters.gains
+    }
+
     /// The communication side, to look at.
     pub const fn node(&self) -> &Node<TableStorage> {
         self.device.node()
@@ -123,8 +135,8 @@ impl Zlim42c {
         self.read_inputs(sensors);
         self.read_targets();
         let feedback = self.feedback();
-        let Parameters { axis, holding, .. } = &self.parameters;
-        let demand = self.shell.move_axis(feedback, axis, *holding, SUPERVISION_PERIOD_S);
+        let Parameters { axis, holding, supervisions, .. } = &self.parameters;
+        let demand = self.shell.move_axis(feedback, axis, *holding, f64::from(*supervisions) * SUPERVISION_PERIOD_S);
         self.energise(demand);
         if let Some(home) = self.shell.axis.take_home() {
             let offset = self.values().get(HOME_OFFSET);
@@ -140,10 +152,10 @@ impl Zlim42c {
             return;
         }
         let (values, variant, before) = (self.device.values(), self.device.variant(), self.parameters);
-        let mut after = Parameters::of(values, variant);
+        let mut after = Parameters::of(values, variant, self.fidelity);
         let waits = after.pulses_per_turn != before.pulses_per_turn && self.shell.demand != Demand::Off;
         if waits {
-            after = Parameters::with_pulses(values, variant, before.pulses_per_turn);
+            after = Parameters::with_pulses(values, variant, before.pulses_per_turn, self.fidelity);
         } else {
             self.stepper.rescale(before.model.pulses_per_electrical_turn, after.model.pulses_per_electrical_turn);
         }
@@ -160,7 +172,7 @@ impl Zlim42c {
             eeprom_sound: self.device.is_eeprom_sound(),
             latched: self.faults.latched(),
         };
-        let new = self.faults.observe(causes(sensors, &situation));
+        let new = self.faults.observe_for(causes(sensors, &situation), self.parameters.supervisions);
         self.enter_fault(new, now);
     }
 
@@ -194,7 +206,8 @@ impl Zlim42c {
 
     /// Debounced inputs.
     fn read_inputs(&mut self, sensors: &Sensors) {
-        let periods = terminals::filter_periods(self.values());
+        let supervisions = self.parameters.supervisions;
+        let periods = terminals::filter_periods(self.values()).map(|periods| periods.div_ceil(supervisions));
         let levels = self.shell.inputs.update_each(sensors.inputs, periods);
         let signals = TERMINALS.signals(self.values(), levels);
         if self.shell.take_signals(&signals) {
@@ -231,6 +244,32 @@ impl Zlim42c {
         }
         let Parameters { model, gains, .. } = &self.parameters;
         PowerStage::Modulate { duty: self.stepper.modulate(model, gains, sensors.phase_current_a, sensors.bus_v) }
+    }
+
+    /// The tick of a supervision period, on a power stage that follows by itself.
+    #[cold]
+    #[inline(never)]
+    fn tick_mechanical(&mut self, sensors: &Sensors, now: Instant) -> Actuation {
+        let phase_current_a = sensors.largest_a.map_or(sensors.phase_current_a, |largest_a| [largest_a; 2]);
+        let largest = Sensors { phase_current_a, ..*sensors };
+        if is_over_current(&largest) && self.faults.raise(row::OVER_CURRENT) {
+            self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
+        }
+        self.bus_a = sensors.bus_current_a;
+        self.supervise(&largest, now);
+        let power_stage = if self.shell.demand == Demand::Off {
+            PowerStage::Off
+        } else {
+            self.stepper.follow(&self.parameters.model, sensors.phase_current_a);
+            PowerStage::Follow
+        };
+        self.actuation(power_stage, now)
+    }
+
+    #[inline(always)]
+    fn actuation(&self, power_stage: PowerStage, now: Instant) -> Actuation {
+        let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
+        Actuation { power_stage, outputs: self.shell.outputs, led: led::shown(flashes, now) }
     }
 
     fn publish(&mut self, sensors: &Sensors) {
@@ -308,6 +347,12 @@ impl Firmware for Zlim42c {
     type Hardware = Hardware;
 
     const CONTROL_PERIOD_NS: u64 = CONTROL_PERIOD_NS;
+    const MECHANICAL_PERIODS: Option<[u32; 2]> =
+        Some([SUPERVISION_DIVIDER as u32, SUPERVISION_DIVIDER as u32 * MECHANICAL_SUPERVISIONS as u32]);
+
+    fn set_fidelity(&mut self, fidelity: Fidelity) {
+        *self = Self { dip_address: self.dip_address, ..Self::over(self.device.clone(), fidelity) };
+    }
 
     fn power_on(&mut self, hardware: &Hardware, now: Instant) {
         self.dip_address = hardware.dip_address;
@@ -328,6 +373,9 @@ impl Firmware for Zlim42c {
         if !self.device.is_running() {
             return Actuation::default();
         }
+        if self.fidelity == Fidelity::Mechanical {
+            return self.tick_mechanical(sensors, now);
+        }
         if is_over_current(sensors) && self.faults.raise(row::OVER_CURRENT) {
             self.enter_fault(FaultSet::row(row::OVER_CURRENT), now);
         }
@@ -335,8 +383,8 @@ impl Firmware for Zlim42c {
         if self.shell.is_supervision_due(SUPERVISION_DIVIDER) {
             self.supervise(sensors, now);
         }
-        let flashes = self.shown_fault.map_or(0, |row| FLASHES[row]);
-        Actuation { power_stage: self.power_stage(sensors), outputs: self.shell.outputs, led: led::shown(flashes, now) }
+        let power_stage = self.power_stage(sensors);
+        self.actuation(power_stage, now)
     }
 
     fn eeprom(&self) -> (&[u8], u32) {

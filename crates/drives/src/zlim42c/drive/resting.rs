@@ -12,6 +12,7 @@ impl Resting for Zlim42c {
         // Each by name, so that no new one is forgotten. The lights flash a fault by the time.
         let Self {
             device,
+            fidelity: _,
             dip_address: _,
             parameters: _,
             shell,
@@ -39,6 +40,10 @@ impl Resting for Zlim42c {
 
     fn task_from(&self, at: Instant) -> Option<Instant> {
         self.device.task_from(at)
+    }
+
+    fn task_is_idle(&self) -> bool {
+        self.device.is_task_idle()
     }
 
     fn leave_out_tasks(&mut self, now: Instant) {

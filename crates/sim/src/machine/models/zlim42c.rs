@@ -10,16 +10,18 @@ use canopen::Mux;
 use devices::AxisId;
 use devices::Description;
 use devices::zltech::{ZLIM42C, ZLIM42C_82};
+use drives::engine::actuator::stepper::{FieldDemand, StepperGains, VOLTAGE_DELAY_PERIODS};
 use drives::engine::axis::Demand;
 use drives::engine::device::ResetTimes;
 use drives::engine::storage::StoredImage;
-use drives::zlim42c::assumptions::{REFERENCE_V, TEETH};
+use drives::zlim42c::assumptions::{CONTROL_PERIOD_S, REFERENCE_V, TEETH};
 use drives::zlim42c::hardware::{Actuation, Hardware, PowerStage, Sensors};
 use drives::zlim42c::variations::VARIANT;
 use drives::zlim42c::{Zlim42c, objects, storage};
 use plant::FreeRun;
 use plant::angle::Angle;
-use plant::rest::is_at_rest;
+use plant::field_loop::{FieldLoop, GiveWay};
+use plant::rest::{Rested, is_at_rest, rest};
 use plant::stepper::{Bridges, Phase};
 use plant::stepper_motor::{StepperMotor, StepperMotorModel};
 use plant::supply::SupplyData;
@@ -92,6 +94,30 @@ const fn dip_address(node: u8) -> u8 {
     if node <= 15 { node } else { 0 }
 }
 
+/// What the firmware asks for of a power stage that follows by itself, as the plant takes it.
+#[inline]
+fn field_loop(path: &FieldDemand, gains: &StepperGains) -> FieldLoop {
+    let at_limit = &gains.at_limit;
+    FieldLoop {
+        from_turns: path.from_turns,
+        way_turns: path.way_turns,
+        pulse_turns: path.pulse_turns,
+        amplitude_a: f64::from(path.amplitude_a),
+        detent_a: f64::from(path.detent_a),
+        detent_lead_turns: f64::from(path.detent_lead_turns),
+        proportional: f64::from(gains.current.proportional),
+        integral_per_s: f64::from(gains.current.integral_per_s),
+        modulation_limit: f64::from(gains.modulation_limit),
+        voltage_lag_s: f64::from(VOLTAGE_DELAY_PERIODS) * f64::from(CONTROL_PERIOD_S),
+        give_way: GiveWay {
+            turns_per_a: f64::from(at_limit.turns_per_a),
+            across_share: f64::from(at_limit.across_share),
+            passed: at_limit.passed.map(f64::from),
+            integral_share: f64::from(at_limit.integral_share),
+        },
+    }
+}
+
 /// Motor, load, supply and memory of a ZLIM42-C whose body is this many mm long.
 #[derive(Clone, Debug)]
 pub struct Stepper<const LENGTH_MM: u16> {
@@ -142,6 +168,15 @@ impl<const LENGTH_MM: u16> Stepper<LENGTH_MM> {
 
     fn addressed(node: u8, baud_rate: u16) -> Self {
         Self::new(dip_address(node), StoredImage::of(&storage::addressed(&VARIANT, node, baud_rate)))
+    }
+
+    #[inline(always)]
+    fn note(&mut self, actuation: &Actuation) {
+        self.last = *actuation;
+        // The green light: the firmware runs.
+        if self.zero.is_none() && actuation.led.green {
+            self.zero = Some(self.rotor_turns().round());
+        }
     }
 
     fn damage(&self) -> Option<&'static str> {
@@ -195,6 +230,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
             reference_v: if self.reference_broken { 0.0 } else { REFERENCE_V },
             inputs: [0, 1, 2, 3].map(|n| inputs >> n & 1 != 0),
             eeprom_ok: !self.eeprom_broken,
+            largest_a: None,
         }
     }
 
@@ -211,17 +247,41 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     // Inlined by force: it has a second caller, in periods without firmware.
     #[inline(always)]
     fn step(&mut self, actuation: &Actuation) {
-        self.last = *actuation;
-        // The green light: the firmware runs.
-        if self.zero.is_none() && actuation.led.green {
-            self.zero = Some(self.rotor_turns().round());
-        }
+        self.note(actuation);
         self.motor.step(Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation));
     }
 
-    fn can_rest(&self, actuation: &Actuation, dt_s: f64) -> bool {
+    fn add_followed(&self, sensors: &mut Sensors) {
+        sensors.largest_a = self.motor.largest_current_a().map(|largest_a| largest_a as f32);
+    }
+
+    fn step_long(&mut self, firmware: &Zlim42c, actuation: &Actuation, dt_s: f64) {
+        self.note(actuation);
+        if actuation.power_stage == PowerStage::Follow {
+            self.motor.field.settings = field_loop(firmware.path(), firmware.current_gains());
+            self.motor.follow_long(dt_s);
+        } else {
+            self.motor.coast_long(dt_s);
+        }
+    }
+
+    fn can_rest(&self, actuation: &Actuation, _dt_s: f64) -> bool {
+        let idle = actuation.power_stage != PowerStage::Follow;
         let quiet = self.motor.rotor.velocity_rad_s == 0.0 && (self.zero.is_some() || !actuation.led.green);
-        quiet && is_at_rest(&self.motor, dt_s, &self.pins(AxisId::FIRST, actuation))
+        idle && quiet && is_at_rest(&self.motor, Self::PERIOD_S, &self.pins(AxisId::FIRST, actuation))
+    }
+
+    /// Its idle steps are control periods at either fidelity.
+    fn rest(&mut self, actuation: &Actuation, dt_s: f64, periods: u64) -> Rested {
+        let pins = self.pins(AxisId::FIRST, actuation);
+        let each = (dt_s / Self::PERIOD_S).round() as u64;
+        let mut rest_for = |steps| rest(std::slice::from_mut(&mut self.motor), Self::PERIOD_S, |_| pins, steps);
+        let mut rested = rest_for(periods * each);
+        // To the end of the last of them.
+        while !rested.steps.is_multiple_of(each) {
+            rested.steps += rest_for(each - rested.steps % each).steps;
+        }
+        Rested { steps: rested.steps / each, ..rested }
     }
 
     #[inline]
@@ -248,6 +308,7 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
                 Bridges::Driven(with_dead_time(duty.map(f64::from), self.motor.sense().phase_current_a))
             }
             PowerStage::Modulate { duty } => Bridges::Driven(duty.map(f64::from)),
+            PowerStage::Follow => Bridges::Regulated(self.motor.stepper.current_a),
         }
     }
 

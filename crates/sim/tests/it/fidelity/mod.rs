@@ -1,14 +1,19 @@
 //! Fidelity mechanical beside full, over the standard procedures and the faults that come from physics: docs/fidelity.md has the
 //! table of what is measured here.
 
+mod carried;
 mod described;
 mod hub_servo;
 mod joint;
 mod pair;
+mod stepper;
+
+use std::sync::LazyLock;
 
 use can::Bitrate;
 use canopen::NodeId;
-use devices::zltech::ZLIM42C;
+use devices::Description;
+use devices::servo::CIA402;
 use pair::{NODE, Script, Subject, trace, world, write};
 use sim::machine::{Order, order};
 use sim::{Component, Fidelity, Place, Refused, Stimulus};
@@ -27,11 +32,17 @@ fn in_mode(mode: i64, values: &[(u16, usize, i64)], more: Script) -> Script {
 
 #[test]
 fn the_same_world_is_the_same_to_the_last_bit_and_so_is_its_snapshot() {
-    let script = hub_servo::velocity(100, Vec::new());
-    let run = || trace::<hub_servo::HubServo>(Fidelity::Mechanical, &script, 600);
+    repeats::<hub_servo::HubServo>(&hub_servo::velocity(100, Vec::new()));
+    for rpm in [100, 2000] {
+        repeats::<stepper::Short>(&stepper::velocity(rpm, Vec::new()));
+    }
+}
+
+fn repeats<S: Subject>(script: &Script) {
+    let run = || trace::<S>(Fidelity::Mechanical, script, 600);
     assert_eq!(run(), run());
-    let (mut world, host) = world::<hub_servo::HubServo>(Fidelity::Mechanical);
-    for (_, act) in &script {
+    let (mut world, host) = world::<S>(Fidelity::Mechanical);
+    for (_, act) in script {
         let pair::Act::Frame(frame) = act else { continue };
         world.send(host, *frame).expect("room at the host");
         world.run_for(std::time::Duration::from_millis(5));
@@ -45,11 +56,20 @@ fn the_same_world_is_the_same_to_the_last_bit_and_so_is_its_snapshot() {
 }
 
 #[test]
-fn a_model_without_such_a_form_is_refused_when_it_is_ordered() {
+fn a_node_without_a_motor_is_refused_when_it_is_ordered() {
+    static NODE_ALONE: LazyLock<Description> = LazyLock::new(|| Description { name: "sensor", axes: &[], ..CIA402 });
     let node = NodeId::new(NODE).expect("a node-ID");
-    let ordered = Order { fidelity: Fidelity::Mechanical, ..Order::new(&ZLIM42C, node, Bitrate::K500) };
-    let refusal = order(&ZLIM42C, &ordered).err().expect("a refusal").to_string();
-    assert!(refusal.contains("a zlim42c cannot be simulated with fidelity mechanical"), "{refusal}");
+    let ordered = Order { fidelity: Fidelity::Mechanical, ..Order::new(&NODE_ALONE, node, Bitrate::K500) };
+    let refusal = order(&NODE_ALONE, &ordered).err().expect("a refusal").to_string();
+    assert!(refusal.contains("a sensor cannot be simulated with fidelity mechanical"), "{refusal}");
+}
+
+#[test]
+fn every_model_of_a_drive_can_be_ordered_with_it() {
+    for model in sim::machine::models() {
+        let ordered = Order { fidelity: Fidelity::Mechanical, ..Order::new(model, NodeId::MIN, Bitrate::K500) };
+        assert!(order(model, &ordered).is_ok(), "{}", model.name);
+    }
 }
 
 #[test]
@@ -68,8 +88,10 @@ fn a_fault_of_single_phases_is_refused_and_one_that_the_sensors_show_is_not() {
         world.apply(Place::node(NODE), &Stimulus::Fault(component, true)).expect("a drive")
     }
     for component in [Component::Phase, Component::Short] {
-        let refused = asked::<hub_servo::HubServo>(component).expect_err("a refusal");
-        assert!(refused.to_string().contains("choose fidelity full for this fault"), "{refused}");
+        for asked in [asked::<hub_servo::HubServo>, asked::<stepper::Short>] {
+            let refused = asked(component).expect_err("a refusal");
+            assert!(refused.to_string().contains("choose fidelity full for this fault"), "{refused}");
+        }
     }
     for component in [Component::Hall, Component::Encoder, Component::Eeprom, Component::Reference] {
         assert_eq!(asked::<hub_servo::HubServo>(component), Ok(()), "{component:?}");

@@ -31,9 +31,14 @@ pub(super) enum Act {
 
 /// An SDO download of so many bytes.
 pub(super) fn write(index: u16, size: usize, value: i64) -> Act {
+    write_entry((index, 0), size, value)
+}
+
+/// The same to an entry of an array or a record.
+pub(super) fn write_entry((index, sub_index): (u16, u8), size: usize, value: i64) -> Act {
     let command = [0, 0x2F, 0x2B, 0, 0x23][size];
     let [low, high] = index.to_le_bytes();
-    let mut data = [command, low, high, 0, 0, 0, 0, 0];
+    let mut data = [command, low, high, sub_index, 0, 0, 0, 0];
     data[4..4 + size].copy_from_slice(&value.to_le_bytes()[..size]);
     Act::Frame(Frame::full(CanId::standard(0x600 + u16::from(NODE)), data))
 }
