@@ -31,11 +31,16 @@ class Engine:
 
     def step(self):
         """One step of both."""
-        data = self.data
-        data.qfrc_applied[self.speeds] = self.world.exchange(
-            self.model.opt.timestep, data.qpos[self.angles], data.qvel[self.speeds]
-        )
-        mujoco.mj_step(self.model, data)
+        self.step_with(self.world.exchange(self.model.opt.timestep, *self.motion()))
+
+    def motion(self):
+        """Angles and velocities of the joints."""
+        return self.data.qpos[self.angles], self.data.qvel[self.speeds]
+
+    def step_with(self, torque_nm):
+        """One step of MuJoCo alone, after an exchange that gave these torques."""
+        self.data.qfrc_applied[self.speeds] = torque_nm
+        mujoco.mj_step(self.model, self.data)
 
     def run(self, seconds):
         for _ in range(round(seconds / self.model.opt.timestep)):

@@ -55,20 +55,43 @@ class Square(gymnasium.Env):
             for node in NODES:
                 self.host.write(node, 0x6040, 0, controlword, 2)
         list(self.world.events())
-        self._exchange((0, 0))
+        self.send((0, 0))
+        self.engine.run(PERIOD_S)
         self.begin = self.engine.state()
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
+        self.go_back()
+        self.engine.run(PERIOD_S)
+        return self.begun()
+
+    def step(self, action):
+        self.send(numpy.clip(action, -MOST_RPM, MOST_RPM))
+        self.engine.run(PERIOD_S)
+        return self.done()
+
+    def go_back(self):
+        """The first half of a reset, up to the time that passes."""
         self.engine.set_state(self.begin)
         # Counts of an encoder begin where it was switched on.
         self.corner = self.steps = 0
-        self._exchange((0, 0))
+        self.send((0, 0))
+
+    def begun(self):
+        """The second half."""
+        self._hear()
         self.left = self._left()
         return self._observation(), {}
 
-    def step(self, action):
-        self._exchange(numpy.clip(action, -MOST_RPM, MOST_RPM))
+    def send(self, targets_rpm):
+        """The first half of a step: the targets, and SYNC."""
+        for node, target_rpm in zip(NODES, targets_rpm):
+            self.host.send(0x200 + node, int(target_rpm).to_bytes(4, "little", signed=True))
+        self.host.send(0x080)
+
+    def done(self):
+        """The second half: what the wheels have answered, and what came of it."""
+        self._hear()
         self.steps += 1
         reward, self.left = self.left - self._left(), self._left()
         if self.left < CLOSE_M and self.corner < len(CORNERS):
@@ -79,12 +102,7 @@ class Square(gymnasium.Env):
         ended = self.corner == len(CORNERS) or fault is not None
         return self._observation(), reward, ended, self.steps >= MOST_STEPS, info
 
-    def _exchange(self, targets_rpm):
-        """A cycle: the targets, SYNC, and what the wheels answer; then its time passes."""
-        for node, target_rpm in zip(NODES, targets_rpm):
-            self.host.send(0x200 + node, int(target_rpm).to_bytes(4, "little", signed=True))
-        self.host.send(0x080)
-        self.engine.run(PERIOD_S)
+    def _hear(self):
         self.host.hear()
         said = [self.host.heard.get(0x180 + node, bytes(6)) for node in NODES]
         self.statusword = [int.from_bytes(data[:2], "little") for data in said]

@@ -10,7 +10,8 @@ gymnasium = pytest.importorskip("gymnasium")
 import numpy  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from reach import Reach, straight_there  # noqa: E402
-from square import Odometry, Square  # noqa: E402
+from square import MOST_RPM, Odometry, Square  # noqa: E402
+from squares import Squares  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -52,25 +53,84 @@ def test_a_base_drives_past_the_corners_of_its_square(square):
     assert sorted(set(seen[:, 0, 2])) == [0, 1, 2, 3, 4]
 
 
-def test_a_fault_ends_an_episode_with_its_reason(square):
-    square.reset(seed=1)
-    policy = Odometry()
-    observation = square._observation()
+@pytest.mark.parametrize(
+    ("name", "stimulus", "reason"),
+    [
+        ("square", "4 fault hall on", "node 4: fault 0200h, Hall sensor"),
+        ("reach", "2 supply 60", "node 2: fault 0015h, over-voltage"),
+    ],
+)
+def test_a_fault_ends_an_episode_with_its_reason(name, stimulus, reason, request):
+    environment = request.getfixturevalue(name)
+    policy = Odometry() if name == "square" else straight_there
+    observation, _ = environment.reset(seed=1)
     for step in range(500):
-        observation, _, ended, _, info = square.step(policy(observation))
+        observation, _, ended, _, info = environment.step(policy(observation))
         if ended:
             break
         if step == 200:
-            square.world[4].set_fault("hall")
-    assert ended and info["fault"] == "node 4: fault 0200h, Hall sensor"
-    _, info = square.reset(seed=1)
-    assert info == {} and not square.step([30, -30])[2], "the snapshot knows nothing of the fault"
+            environment.world.apply(stimulus)
+    assert ended and info["fault"] == reason
+    _, info = environment.reset(seed=1)
+    nothing = numpy.zeros(environment.action_space.shape, numpy.int32)
+    assert info == {} and not environment.step(nothing)[2], "the snapshot knows nothing of the fault"
 
 
-def test_steps_a_second(square, record_property):
-    """Recorded, and not asked of a machine that does other things besides: docs/performance.md has the figure."""
+#: Enough for a second thread (32 of a drive's milliseconds in a step), and odd.
+MANY = 17
+
+
+def test_many_bases_side_by_side_are_to_the_bit_what_each_is_alone():
+    """The vector environment against single ones, for the same seeds and actions, over an end by a fault and the reset after it."""
+    many = Squares(MANY)
+    chance = numpy.random.default_rng(5)
+    actions = chance.integers(-MOST_RPM, MOST_RPM, (24, MANY, 2)).repeat(5, axis=0)
+    broken, at = 3, 60
+    seen = [(*many.reset(seed=7), None)]
+    for step, action in enumerate(actions):
+        if step == at:
+            many.squares[broken].world.apply("4 fault hall on")
+        seen.append(many.step(action))
+    ends = [step for step, of_all in enumerate(seen[1:]) if of_all[2].any()]
+    assert len(ends) == 1 and ends[0] >= at, "the fault ends one episode, and its reset begins another"
+    infos = seen[1 + ends[0]][4]
+    assert list(infos["_fault"]) == [number == broken for number in range(MANY)]
+    assert infos["fault"][broken] == "node 4: fault 0200h, Hall sensor"
+
+    square = Square()
+    for number in range(MANY):
+        observation, _ = square.reset(seed=7 + number)
+        assert numpy.array_equal(observation, seen[0][0][number])
+        ended = False
+        for step, action in enumerate(actions[:, number]):
+            if number == broken and step == at:
+                square.world.apply("4 fault hall on")
+            if ended:
+                observation, _ = square.reset()
+                reward, ended, cut = 0.0, False, False
+            else:
+                observation, reward, ended, cut, _ = square.step(action)
+            of_all = seen[1 + step]
+            assert numpy.array_equal(observation, of_all[0][number]), (number, step)
+            assert (reward, ended, cut) == (of_all[1][number], of_all[2][number], of_all[3][number]), (number, step)
+
+
+def test_the_vector_environment_fits_its_spaces():
+    many = Squares(2)
+    observations, _ = many.reset(seed=1)
+    assert many.observation_space.contains(observations)
+    observations, rewards, *_ = many.step(many.action_space.sample())
+    assert many.observation_space.contains(observations) and rewards.shape == (2,)
+    with pytest.raises(ValueError):
+        many.step(many.action_space.sample()[:1])
+
+
+def test_a_thousand_steps_a_second_and_core_at_least(square, record_property):
+    """Of the processor's time, not of the clock: some eleven times as many were measured (docs/performance.md)."""
     square.reset(seed=1)
     begin = time.process_time()
     for _ in range(500):
         square.step([30, -30])
-    record_property("steps_per_cpu_second", round(500 / (time.process_time() - begin)))
+    steps_a_second = round(500 / (time.process_time() - begin))
+    record_property("steps_per_cpu_second", steps_a_second)
+    assert steps_a_second > 1000
