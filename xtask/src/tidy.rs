@@ -15,6 +15,7 @@ mod paths;
 mod sizes;
 mod source;
 mod text;
+mod unsafe_code;
 mod wording;
 
 use std::process::{Command, ExitCode};
@@ -44,6 +45,7 @@ const SOURCE_RULES: &[SourceRule] = &[
     manifests::includes,
     sizes::files,
     sizes::functions,
+    unsafe_code::in_code,
 ];
 
 const TEXT_RULES: &[TextRule] = &[text::typography, text::machine_paths, text::line_ends, wording::habits];
@@ -80,6 +82,7 @@ fn findings() -> Result<Vec<Finding>, String> {
         let exists = |path: &str| workspace::root().join(path).exists();
         found.extend(manifests::of_crates(&path, &text, exists));
         found.extend(paths::of_page(&path, &text, exists));
+        found.extend(unsafe_code::of_manifest(&path, &text));
         if path.ends_with(".rs") {
             let source = Source::new(&path, &text);
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
