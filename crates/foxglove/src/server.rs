@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
 use recording::{Batch, Channels, Column};
-use tokio::net::{TcpListener, TcpStream};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::task::LocalSet;
 use tokio::time::timeout;
@@ -32,7 +33,8 @@ const LARGEST_MESSAGE: usize = 64 << 10;
 /// How long a handshake may take.
 const HANDSHAKE_PATIENCE: Duration = Duration::from_secs(5);
 
-/// How long a client may take to read anything at all; the kernel takes some 100 kB for it before that counts.
+/// How long a client may take to read anything at all; the kernel takes some 100 kB for it before that counts, between programs of one
+/// machine some MB.
 const READING_PATIENCE: Duration = Duration::from_secs(30);
 
 /// Pause after a failed accept (out of file descriptors): the clients that are there go on.
@@ -207,7 +209,7 @@ async fn accept(listener: TcpListener, options: Options, clients: Rc<Clients>) {
 }
 
 /// Serves a client until it goes, reads nothing, or nothing more comes.
-async fn talk(socket: WebSocketStream<TcpStream>, clients: &Clients, client: &Client) {
+async fn talk<S: AsyncRead + AsyncWrite + Unpin>(socket: WebSocketStream<S>, clients: &Clients, client: &Client) {
     let (mut sink, mut stream) = socket.split();
     let writing = async {
         while let Some(message) = client.next().await {
@@ -270,6 +272,7 @@ mod tests {
     use serde_json::Value;
     use tokio_tungstenite::connect_async;
     use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+    use tokio_tungstenite::tungstenite::protocol::Role;
 
     use super::*;
 
@@ -315,4 +318,34 @@ mod tests {
         let taken = Server::start(&server.address().to_string(), Options::default(), Channels::of(&[]));
         assert_eq!(taken.err().expect("it is taken").kind(), io::ErrorKind::AddrInUse);
     }
+
+    /// In a time of its own, over a pipe of 1 KiB.
+    #[tokio::test(start_paused = true)]
+    async fn a_viewer_that_reads_nothing_is_sent_away_after_its_time_and_one_that_reads_is_not() {
+        let clients = Clients::new(Channels::of(&[]), "a".to_owned(), Arc::default());
+        for reads in [false, true] {
+            let (ours, theirs) = tokio::io::duplex(1024);
+            let socket = WebSocketStream::from_raw_socket(ours, Role::Server, None).await;
+            let client = clients.join();
+            (0..MOST_WAITING).for_each(|_| assert!(client.say(" ".repeat(1024))));
+            let mut viewer = WebSocketStream::from_raw_socket(theirs, Role::Client, None).await;
+            let begin = tokio::time::Instant::now();
+            let reading = async {
+                while reads && viewer.next().await.is_some() {}
+                std::future::pending::<()>().await
+            };
+            let ended = tokio::select! {
+                () = talk(socket, &clients, &client) => true,
+                () = reading => false,
+                () = tokio::time::sleep(READING_PATIENCE * 10) => false,
+            };
+            assert_eq!(ended, !reads, "a viewer that reads: {reads}");
+            if !reads {
+                assert!((READING_PATIENCE..READING_PATIENCE * 2).contains(&begin.elapsed()), "{:?}", begin.elapsed());
+            }
+        }
+    }
+
+    /// Texts that fill the pipe many times.
+    const MOST_WAITING: usize = 100;
 }

@@ -87,3 +87,14 @@ fn a_replay_does_to_a_drive_what_was_done_when_the_log_was_written() {
     second.done(&["replay", log, "--only", "sent", "--allow-motion"]);
     assert_eq!(state(), "Operation enabled");
 }
+
+#[test]
+fn a_record_in_virtual_time_refuses_viewers_who_could_not_come_in_time() {
+    let place = scratch("viewers-of-a-record");
+    let path = place.join("run.csv");
+    let words = ["--bus", "sim", "record", "4", "606C", "-o", path.to_str().unwrap(), "--foxglove", "127.0.0.1:0"];
+    let ended = without_bus(&words);
+    assert_eq!(ended.status, Some(2), "{}{}", ended.out, ended.err);
+    assert!(ended.err.contains("over before anyone could look") && ended.err.contains("sim --serve"), "{}", ended.err);
+    assert!(!path.exists());
+}

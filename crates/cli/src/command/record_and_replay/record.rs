@@ -137,6 +137,11 @@ impl Record {
             return Err(Failure::usage("a record and lines of JSON cannot both go to standard output")
                 .next("give --output NAME.csv, or omit --json"));
         }
+        if self.viewers.is_asked_for() && context.is_embedded() {
+            return Err(Failure::usage("--foxglove has no meaning where virtual time does not follow the clock")
+                .because("this record is over before anyone could look")
+                .next("start the drives with ferrodrive sim --serve URL and record with --bus URL, or open the record afterwards"));
+        }
         let drive = context.drive(self.node).await?;
         let sources =
             self.objects.iter().map(|object| RecordedObject::new(&drive, object)).collect::<Result<Vec<_>, _>>()?;
