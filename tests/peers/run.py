@@ -20,7 +20,7 @@ from checks import CHECKS, Skip
 HERE = pathlib.Path(__file__).resolve().parent
 #: Where checks stand: a file for each service, the data sheets, and the servo that is made from one.
 MODULES = [f"services.{path.stem}" for path in sorted((HERE / "services").glob("[a-z]*.py"))]
-MODULES += ["container", "dbc", "eds", "fmu", "fmu2", "foxglove", "logs", "recording", "cia402.blocks", "cia402.lss", "cia402.motion", "cia402.makers"]
+MODULES += ["container", "dbc", "eds", "fmu", "fmu2", "foxglove", "logs", "ls_bus", "recording", "cia402.blocks", "cia402.lss", "cia402.motion", "cia402.makers"]
 #: Checks mostly wait for a drive to move, so more of them run at once than the machine has cores.
 JOBS = 6
 
