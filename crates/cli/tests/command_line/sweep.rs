@@ -1,6 +1,8 @@
 //! The results of a sweep as a file: shards, what goes on after a kill, and how the parts come together. Files that are cut at each
 //! byte are asked in the library (`crates/scenario/src/sweep/results/tests.rs`).
 
+#![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
+
 use std::path::Path;
 use std::process::Stdio;
 
@@ -211,4 +213,58 @@ fn the_lines_of_each_engine_in_the_handbook_make_the_table_of_one_process() {
         engines += 1;
     }
     assert_eq!(engines, 5, "the page's beginning, GNU parallel, a matrix, Slurm, Kubernetes");
+}
+
+/// The same as the shells of the engines get them: the lines of GNU parallel with GNU parallel, where it is installed, the script of an
+/// array and the command of a pod with what Slurm and Kubernetes set for each.
+#[cfg(unix)]
+#[test]
+fn the_shells_of_the_engines_run_their_lines_as_the_handbook_has_them() {
+    let text = processes::page("handbook/sweeps.md");
+    let section = |title: &str| text.split("\n## ").find(|it| it.starts_with(title)).expect("a section");
+    let block = |title: &str| section(title).split("```").nth(1).and_then(|it| it.split_once('\n')).expect("a block").1;
+    let is_gnu = command_of("parallel", &["--version"]).output().is_ok_and(|it| it.stdout.starts_with(b"GNU parallel"));
+    if !is_gnu {
+        eprintln!("skipped for GNU parallel: it is not installed here");
+    }
+    let parallel: Vec<String> = if is_gnu { vec![block("GNU parallel").to_owned()] } else { Vec::new() };
+    let array = (1..=4).map(|task| format!("export SLURM_ARRAY_TASK_ID={task}\n{}", block("An array of Slurm")));
+    // Its lines are one text (YAML 1.2.2, 7.3.3).
+    let pod = block("An indexed job of Kubernetes").split_once("args:\n").expect("its arguments").1;
+    let pod: Vec<&str> = pod.lines().map(|line| line.trim_start().trim_start_matches("- ")).collect();
+    let pods = (0..4).map(|index| format!("export JOB_COMPLETION_INDEX={index}\n{}", pod.join(" ")));
+    for (engine, scripts) in [("parallel", parallel), ("array", array.collect()), ("pods", pods.collect())] {
+        let folder = scratch(&format!("sweep-shell-{engine}"));
+        let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/step_loss.toml");
+        std::fs::copy(example, folder.join("step_loss.toml")).unwrap();
+        for script in &scripts {
+            let script = script.replace("1..100000", "1..3");
+            let ended = command_of("bash", &["-e", "-c", &script]).current_dir(&*folder).output().expect("bash");
+            assert!(ended.status.success(), "{script}: {}", String::from_utf8_lossy(&ended.stderr));
+        }
+        if scripts.is_empty() {
+            continue;
+        }
+        let run = |words: &[&str]| {
+            let words = [&["run", "step_loss.toml", "--seeds", "1..3"], words].concat();
+            assert!(command(&words).current_dir(&*folder).output().expect("the program runs").status.success());
+        };
+        run(&["-o", "one.jsonl"]);
+        if engine != "parallel" {
+            let parts = ["part-1.jsonl", "part-2.jsonl", "part-3.jsonl", "part-4.jsonl"];
+            run(&[&["--merge"], &parts[..], &["-o", "results.jsonl"]].concat());
+        }
+        assert_eq!(read(&folder.path("results.jsonl")), read(&folder.path("one.jsonl")), "{engine}");
+    }
+}
+
+/// A program that finds `ferrodrive` on its PATH.
+#[cfg(unix)]
+fn command_of(program: &str, arguments: &[&str]) -> std::process::Command {
+    let own = Path::new(processes::program()).parent().expect("its folder").to_owned();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths([own].into_iter().chain(std::env::split_paths(&others))).expect("a PATH");
+    let mut command = std::process::Command::new(program);
+    command.args(arguments).env("PATH", path).env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE");
+    command
 }
