@@ -288,10 +288,20 @@ def test_a_base_rolls_on_a_floor_as_far_as_its_wheels_turn():
     assert went > 0.4
 
 
+def lines_of(svg):
+    """The points of each line of a picture."""
+    lines = xml.etree.ElementTree.fromstring(svg).findall("{http://www.w3.org/2000/svg}polyline")
+    return [numpy.array([point.split(",") for point in line.get("points").split()], float) for line in lines]
+
+
 def test_what_the_firmware_changes_is_drawn():
     curves = pendulum.run()
-    picture = xml.etree.ElementTree.fromstring(pendulum.picture(curves))
-    assert len(picture.findall("{http://www.w3.org/2000/svg}polyline")) == 4
+    page = HERE.parents[1] / "docs" / "handbook" / "pendulum.svg"
+    drawn, shown = lines_of(pendulum.picture(curves)), lines_of(page.read_text(encoding="utf-8"))
+    assert len(drawn) == 4
+    # To a point of the picture: another processor may round otherwise.
+    assert [line.shape for line in drawn] == [line.shape for line in shown]
+    assert all(numpy.abs(line - other).max() <= 1 for line, other in zip(drawn, shown)), "python examples/mujoco/pendulum.py docs/handbook/pendulum.svg"
     ends = {name: points[-1][1] for name, points in curves.items()}
     for name, angle in ends.items():
         assert angle == pytest.approx(pendulum.TARGET_RAD, abs=0.1), name
