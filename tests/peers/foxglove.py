@@ -284,12 +284,11 @@ def stalled(bench):
 
             while not times:
                 read()
-            # It reads nothing for four seconds of the bus, and the drive answers all the same.
+            # It reads nothing for four seconds of the bus and more, and the drive answers all the same: a bus that is held answers nothing.
             begin, answers = live.now(), 0
-            while live.now() < begin + 4:
+            while answers < 100 or live.now() < begin + 4:
                 equal(live.read(0x1000), live.drive.device_type, "1000h, while a viewer reads nothing")
                 answers += 1
-            true(answers > 20, f"{answers} answers in four seconds")
 
             def missed():
                 return sum((later - earlier) // FAST_NS - 1 for earlier, later in zip(times, times[1:]))
