@@ -16,7 +16,7 @@ use crate::subject::Subject;
 /// One case of the suite.
 #[derive(Clone, Copy)]
 pub struct Case {
-    /// CiA's number where it is public (`SDO 07`); from 51 on, and `402-..`, ours.
+    /// CiA's number where it is public (`SDO 07`), but for OD 07 and OD 08, which ask more; from 51 on, and `402-..`, ours.
     pub id: &'static str,
     /// What is asked, in a line.
     pub title: &'static str,
@@ -116,6 +116,8 @@ pub enum Need {
     Sub(u16, u8),
     /// An SDO server beside the first one.
     FurtherServer,
+    /// An error that the suite can bring about: a heartbeat that stays away, or a receive PDO that is too short.
+    AnError,
     /// A receive PDO.
     Rpdo,
     /// A transmit PDO.
@@ -143,6 +145,7 @@ impl Need {
             Self::Writable(index) => subject.row(index, 0).is_some_and(|row| row.access.is_writable()),
             Self::Sub(index, sub_index) => subject.row(index, sub_index).is_some(),
             Self::FurtherServer => subject.rows().any(|row| is_further_server(row.index)),
+            Self::AnError => description.has_index(0x1016) || subject.pdos(0x1400).next().is_some(),
             Self::Rpdo => subject.pdos(0x1400).next().is_some(),
             Self::Tpdo => subject.pdos(0x1800).next().is_some(),
             Self::Lss => description.lss,
@@ -154,11 +157,13 @@ impl Need {
         }
     }
 
-    /// The object by which a description shows it.
-    pub(crate) const fn index(self) -> Option<u16> {
+    /// The object by which a device shows it.
+    pub(crate) const fn object(self) -> Option<Mux> {
         match self {
-            Self::Index(index) | Self::Writable(index) | Self::Sub(index, _) => Some(index),
-            Self::PowerStates => Some(0x6041),
+            Self::Index(index) | Self::Writable(index) => Some(Mux::new(index, 0)),
+            Self::Sub(index, sub_index) => Some(Mux::new(index, sub_index)),
+            Self::AnError => Some(Mux::new(0x1016, 0)),
+            Self::PowerStates => Some(Mux::new(0x6041, 0)),
             _ => None,
         }
     }
@@ -172,6 +177,7 @@ impl fmt::Display for Need {
             Self::Writable(index) => write!(f, "the device has no object {index:04X}h that can be written"),
             Self::Sub(index, sub_index) => write!(f, "the device has no object {}", Mux::new(*index, *sub_index)),
             Self::FurtherServer => f.write_str("the device has no SDO server beside the first one: 1201h to 127Fh"),
+            Self::AnError => f.write_str("the device has neither 1016h nor a receive PDO: nothing brings an error about"),
             Self::Rpdo => f.write_str("the device has no receive PDO"),
             Self::Tpdo => f.write_str("the device has no transmit PDO"),
             Self::Lss => f.write_str("the device is not said to have LSS"),

@@ -36,8 +36,7 @@ impl Subject {
     /// A departure in words, with its place in the manual.
     pub(crate) fn cited(&self, departure: &Departure) -> String {
         let manual = self.description.manual;
-        let section = departure.object().and_then(|object| self.description.section(object.index));
-        let section = section.map(|section| format!(", {section}")).unwrap_or_default();
+        let section = self.description.section_of(departure).map(|section| format!(", {section}")).unwrap_or_default();
         format!("{departure} ({manual}{section})")
     }
 

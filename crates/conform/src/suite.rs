@@ -2,17 +2,16 @@
 
 use std::time::Duration;
 
-use canopen::Mux;
-use canopen::NmtCommand;
+use canopen::{AbortCode, Mux, NmtCommand};
 use cia402::{PowerState, Statusword};
 use devices::Departure;
 use master::Network;
 
-use crate::bench::{Bench, Restorer, SILENCE};
+use crate::bench::{Bench, Restorer, SILENCE, refused};
 use crate::capture::Capture;
 use crate::case::{Case, Need};
 use crate::cases;
-use crate::finding::Finding;
+use crate::finding::{Finding, Verdict, fail};
 use crate::options::Options;
 use crate::report::{CaseResult, Outcome, Report};
 use crate::subject::Subject;
@@ -164,13 +163,14 @@ impl Suite {
             frames,
         };
         if let Some(need) = case.unmet(&subject, &self.options) {
-            let (outcome, why) = absent(&subject, need);
-            return (result(outcome, why, Vec::new()), Vec::new());
+            let (outcome, why, frames) = self.absent(need).await;
+            return (result(outcome, why, frames), Vec::new());
         }
         self.bench.begin();
         let verdict = (case.run)(&mut self.bench).await;
+        let (outcome, mut why) = self.judge(case, verdict).await;
         let frames = self.bench.evidence();
-        if verdict.is_err() {
+        if outcome != Outcome::Pass {
             // An answer that is late is not taken for that of another request.
             self.bench.pause(SILENCE).await;
         }
@@ -183,7 +183,6 @@ impl Suite {
             // A lost heartbeat is a fault to a drive, which would hide the next one.
             let _ = self.bench.leave_fault().await;
         }
-        let (outcome, mut why) = self.judge(case, verdict);
         if outcome == Outcome::Fail && !self.is_alive().await {
             why.push_str(&self.revive().await);
             left = self.bench.restorer.restore().await;
@@ -192,18 +191,62 @@ impl Suite {
         (result(outcome, why, frames), left)
     }
 
-    fn judge(&self, case: &Case, verdict: Result<String, Finding>) -> (Outcome, String) {
+    /// What it means that the subject does not have what a case needs. What its manual states is looked at first: that a
+    /// description does not have an object shows nothing of the device.
+    async fn absent(&mut self, need: Need) -> (Outcome, String, Vec<String>) {
+        let subject = self.bench.subject;
+        let (Some(departure), Some(object)) = (stated_absence(&subject, need), need.object()) else {
+            return (Outcome::NotApplicable, need.to_string(), Vec::new());
+        };
+        self.bench.begin();
+        let (outcome, why) = self.shown(&departure, object).await;
+        (outcome, why, self.bench.evidence())
+    }
+
+    /// Looks whether a departure is there that a manual states of an object.
+    async fn shown(&mut self, departure: &Departure, object: Mux) -> (Outcome, String) {
+        let seen = match departure {
+            Departure::EchoesControlword(statusword) => self.shows_no_state(*statusword).await,
+            _ => self.is_refused(object).await,
+        };
+        let cited = self.bench.subject.cited(departure);
+        match seen {
+            Ok(seen) => (Outcome::Expected, format!("{cited}: {seen}")),
+            Err(Finding::Fail(why) | Finding::NotApplicable(why)) => {
+                (Outcome::Fail, format!("{why}; the manual states: {cited}"))
+            }
+        }
+    }
+
+    async fn is_refused(&mut self, object: Mux) -> Verdict {
+        let codes = [AbortCode::NO_SUCH_OBJECT, AbortCode::NO_SUCH_SUB_INDEX, AbortCode::GENERAL];
+        let answer = self.bench.upload(object).await?;
+        refused(&format!("read of {object}"), &answer, &codes)
+    }
+
+    async fn shows_no_state(&mut self, statusword: Mux) -> Verdict {
+        let word = Statusword(self.bench.number(statusword).await? as u16);
+        match word.state() {
+            Some(state) => fail!("{statusword} is {:04X}h, {}", word.0, state.name()),
+            None => Ok(format!("{statusword} is {:04X}h, none of the states of CiA 402", word.0)),
+        }
+    }
+
+    async fn judge(&mut self, case: &Case, verdict: Result<String, Finding>) -> (Outcome, String) {
         let why = match verdict {
             Ok(seen) => return (Outcome::Pass, seen),
             Err(Finding::NotApplicable(why)) => return (Outcome::NotApplicable, why),
             Err(Finding::Fail(why)) => why,
         };
-        let subject = &self.bench.subject;
+        let subject = self.bench.subject;
         let stated = |key: &&str| subject.departures().find(|departure| departure.key() == *key);
-        match case.departures.iter().find_map(stated) {
-            Some(departure) => (Outcome::Expected, format!("{}: {why}", subject.cited(&departure))),
-            None => (Outcome::Fail, why),
-        }
+        let Some(departure) = case.departures.iter().find_map(stated) else { return (Outcome::Fail, why) };
+        let absent = departure.object().filter(|object| !subject.description.has_index(object.index));
+        let (outcome, seen) = match absent {
+            Some(object) => self.shown(&departure, object).await,
+            None => (Outcome::Expected, subject.cited(&departure)),
+        };
+        (outcome, format!("{seen}: {why}"))
     }
 
     async fn is_alive(&mut self) -> bool {
@@ -219,19 +262,19 @@ impl Suite {
     }
 }
 
-/// What it means that the subject does not have what a case needs.
-fn absent(subject: &Subject, need: Need) -> (Outcome, String) {
-    let missing = need.index();
-    let about = |departure: &Departure| {
-        let index = departure.object().map(|object| object.index);
+/// The departure by which the subject does not have what a case needs.
+fn stated_absence(subject: &Subject, need: Need) -> Option<Departure> {
+    let missing = need.object()?;
+    subject.departures().find(|departure| match departure {
+        // An object that is there, and not what the standard has it be.
+        Departure::EchoesControlword(_) => need == Need::PowerStates,
         // What says that nothing is stored is about both objects.
-        let restores = matches!(departure, Departure::NoStoreParameters(_)) && missing == Some(0x1011);
-        missing.is_some() && index == missing || restores
-    };
-    match subject.departures().find(about) {
-        Some(departure) => (Outcome::Expected, subject.cited(&departure)),
-        None => (Outcome::NotApplicable, need.to_string()),
-    }
+        Departure::NoStoreParameters(_) => matches!(missing.index, 0x1010 | 0x1011),
+        _ => {
+            let absent = !subject.description.has_index(missing.index);
+            absent && departure.object().is_some_and(|object| object.index == missing.index)
+        }
+    })
 }
 
 fn number(data: &[u8]) -> u32 {

@@ -58,13 +58,15 @@ pub struct Description {
     pub editions: &'static [Edition],
 }
 
-/// A part of a manual, and the objects that it is about.
+/// A part of a manual, and the objects, or the departure, that it is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
     /// The first index.
     pub from: u16,
     /// The last one.
     pub to: u16,
+    /// The departure that it states, by its [key](crate::Departure::key); empty for a part that describes objects.
+    pub departure: &'static str,
     /// By the manual's own numbers or headings.
     pub section: &'static str,
 }
@@ -72,7 +74,12 @@ pub struct Section {
 impl Section {
     /// The objects of these indexes, ends included.
     pub const fn of(from: u16, to: u16, section: &'static str) -> Self {
-        Self { from, to, section }
+        Self { from, to, departure: "", section }
+    }
+
+    /// A departure that is not stated where the object is described that it is about, or is about none.
+    pub const fn stating(departure: &'static str, section: &'static str) -> Self {
+        Self { from: 1, to: 0, departure, section }
     }
 }
 

@@ -105,6 +105,42 @@ fn each_drive_departs_from_the_standard_where_its_manual_does_and_nowhere_else()
     }
 }
 
+/// The numbers of chapters and sections in words: `5.04, 2614h` has one.
+fn numbers(words: &str) -> Vec<Vec<&str>> {
+    let is_number = |word: &&str| word.chars().all(|letter| letter.is_ascii_digit() || letter == '.');
+    let words = words.split([' ', ',', ';']).filter(|word| !word.is_empty());
+    words.filter(is_number).map(|number| number.split('.').collect()).collect()
+}
+
+/// What is cited is a section that the manual's row names, or one within it, or around it.
+fn assert_cited(name: &str, file: &str) {
+    let model = model(name).expect("a model");
+    let table = Table::parse(file).expect("a table");
+    for departure in model.departures(all()) {
+        let object = departure.object().map(|mux| format!("{mux:X}")).unwrap_or_default();
+        let rows = table.rows().filter(|row| (row.get("departure"), row.get("object")) == (departure.key(), &*object));
+        let sources: Vec<&str> = rows.map(|row| row.get("source")).collect();
+        let cited = model.section_of(&departure).unwrap_or_else(|| panic!("{name}: no section: {departure}"));
+        let within = |one: &[&str], other: &[&str]| one.starts_with(other) || other.starts_with(one);
+        let of_source = |source: &&str| match &numbers(cited)[..] {
+            [] => *source == cited,
+            cited => cited.iter().any(|one| numbers(source).iter().any(|other| within(one, other))),
+        };
+        assert!(sources.iter().any(of_source), "{name}: {departure}: cited {cited}, in the manual {sources:?}");
+    }
+}
+
+#[test]
+fn each_departure_is_cited_with_the_section_of_its_manual() {
+    assert_cited("zlac8030l", include_str!("../../data/zlac8030l/departures.csv"));
+    for name in ["zlim42c", "zlim42c-82"] {
+        assert_cited(name, include_str!("../../data/zlim42c/departures.csv"));
+    }
+    for name in ferrodrive_tests::mjoint::MODELS {
+        assert_cited(name, include_str!("../../data/mjoint/departures.csv"));
+    }
+}
+
 #[test]
 fn each_departure_says_what_is_so_and_what_to_do() {
     for departure in all().iter().flat_map(|model| model.departures(all()).collect::<Vec<_>>()) {

@@ -37,6 +37,14 @@ pub(crate) const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
+/// The data frames of an identifier since a case began to count them.
+#[derive(Debug)]
+struct Counting {
+    id: CanId,
+    at: Vec<Instant>,
+    last: Option<Frame>,
+}
+
 /// A node on a bench.
 #[derive(Debug)]
 pub(crate) struct Bench {
@@ -51,7 +59,7 @@ pub(crate) struct Bench {
     evidence: VecDeque<Frame>,
     pinned: Vec<Frame>,
     watched: Vec<CanId>,
-    counting: Option<(CanId, usize, Option<Frame>)>,
+    counting: Option<Counting>,
     /// Identifiers of the SDO server that is asked: request and reply.
     server: (CanId, CanId),
 }
@@ -162,19 +170,25 @@ impl Bench {
     /// Counts the data frames of an identifier from now on, whatever else the case waits for.
     pub(crate) fn count(&mut self, id: CanId) {
         self.absorb();
-        self.counting = Some((id, 0, None));
+        self.counting = Some(Counting { id, at: Vec::new(), last: None });
     }
 
     /// How many came.
     pub(crate) fn counted(&mut self) -> usize {
         self.absorb();
-        self.counting.map_or(0, |(_, count, _)| count)
+        self.counting.as_ref().map_or(0, |counting| counting.at.len())
+    }
+
+    /// When they came: also those that came while an answer was waited for.
+    pub(crate) fn counted_at(&mut self) -> Vec<Instant> {
+        self.absorb();
+        self.counting.as_ref().map(|counting| counting.at.clone()).unwrap_or_default()
     }
 
     /// The last of them.
     pub(crate) fn last_counted(&mut self) -> Option<Frame> {
         self.absorb();
-        self.counting.and_then(|(_, _, last)| last)
+        self.counting.as_ref().and_then(|counting| counting.last)
     }
 
     /// Takes what has come.
@@ -201,13 +215,13 @@ impl Bench {
             Some(Service::Heartbeat(node) | Service::SdoReply(node) | Service::Emcy(node)) => node == self.node(),
             _ => id.as_standard().is_some_and(|id| id > 0x180 && id & 0x7F == u16::from(self.node().raw())),
         };
-        if let Some((counting, count, last)) = &mut self.counting
-            && *counting == id
+        if let Some(counting) = &mut self.counting
+            && counting.id == id
             && !passed.own
             && !passed.frame.is_remote()
         {
-            *count += 1;
-            *last = Some(passed.frame);
+            counting.at.push(passed.at);
+            counting.last = Some(passed.frame);
         }
         if !passed.own && !of_node && !self.watched.contains(&id) {
             return;

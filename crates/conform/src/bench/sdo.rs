@@ -59,7 +59,7 @@ impl Bench {
     pub(crate) async fn upload(&mut self, mux: Mux) -> Result<SdoResult<Vec<u8>>, Finding> {
         let reply = Reply::parse(&self.exchange(Request::InitiateUpload(mux).emit()).await?);
         let size = match reply {
-            Reply::Abort(_, code) => return Ok(Err(code)),
+            Reply::Abort(about, code) => return aborted(mux, about, code),
             Reply::InitiateUpload(about, Payload::Expedited { length, bytes }) if about == mux => {
                 return Ok(Ok(bytes[..usize::from(length.unwrap_or(4)).min(4)].to_vec()));
             }
@@ -125,7 +125,7 @@ impl Bench {
 
     async fn initiate_download(&mut self, mux: Mux, payload: Payload) -> Result<SdoResult<()>, Finding> {
         match Reply::parse(&self.exchange(Request::InitiateDownload(mux, payload).emit()).await?) {
-            Reply::Abort(_, code) => Ok(Err(code)),
+            Reply::Abort(about, code) => aborted(mux, about, code),
             Reply::InitiateDownload(about) if about == mux => Ok(Ok(())),
             other => fail!("the answer to the download of {mux} is {other:?}"),
         }
@@ -184,6 +184,14 @@ impl Bench {
         }
         Ok(())
     }
+}
+
+/// An abort of a request about an object. That it names none is for SDO 53 to judge; an abort about another is no answer to this.
+fn aborted<T>(asked: Mux, about: Mux, code: AbortCode) -> Result<SdoResult<T>, Finding> {
+    if about != asked && about != Mux::new(0, 0) {
+        fail!("the request was about {asked}, and is aborted as one about {about}: {code}");
+    }
+    Ok(Err(code))
 }
 
 /// Judges an answer that has to be an abort with one of these codes.

@@ -1,8 +1,10 @@
 //! EMCY 01 to 06: the error register, the emergency message and the error history.
 
-use can::Frame;
+use std::time::Duration;
+
+use can::{CanId, Frame};
 use canopen::emcy::Emcy;
-use canopen::{Mux, NmtCommand, NodeId};
+use canopen::{CobId, Mux, NmtCommand, NodeId};
 
 use crate::bench::{Bench, ms, silent};
 use crate::case::{Case, Need, case};
@@ -16,9 +18,9 @@ pub(crate) const CASES: &[Case] = &[
     case!("EMCY 01", "1014h is 80h + node-ID", "CiA 301, 7.5.2.17", [Need::Index(0x1014)], [], identifier),
     case!("EMCY 02", "1001h can be read", "CiA 301, 7.5.2.2", [], [], register),
     case!("EMCY 03", "1003h can be read as far as it counts", "CiA 301, 7.5.2.4", [Need::Index(0x1003)], [], history),
-    case!("EMCY 04", "A lost heartbeat is reported by an EMCY message", "CiA 301, 7.2.7.1", [Need::Index(0x1014), Need::Index(0x1016)], ["host_heartbeat"], |bench| force(bench, After::Message)),
-    case!("EMCY 05", "1001h says what the EMCY message says", "CiA 301, 7.5.2.2", [Need::Index(0x1014), Need::Index(0x1016)], [], |bench| force(bench, After::Register)),
-    case!("EMCY 06", "1003h:01 has the code of the EMCY message", "CiA 301, 7.5.2.4", [Need::Index(0x1014), Need::Index(0x1016), Need::Index(0x1003)], [], |bench| force(bench, After::History)),
+    case!("EMCY 04", "A lost heartbeat, or a short PDO where there is no 1016h, is reported by an EMCY message", "CiA 301, 7.2.7.1", [Need::Index(0x1014), Need::AnError], ["host_heartbeat"], |bench| force(bench, After::Message)),
+    case!("EMCY 05", "1001h says what the EMCY message says", "CiA 301, 7.5.2.2", [Need::Index(0x1014), Need::AnError], [], |bench| force(bench, After::Register)),
+    case!("EMCY 06", "1003h:01 has the code of the EMCY message", "CiA 301, 7.5.2.4", [Need::Index(0x1014), Need::Index(0x1003), Need::AnError], [], |bench| force(bench, After::History)),
     case!("EMCY 51", "1003h:00 takes 0, which forgets all, and nothing else", "CiA 301, 7.5.2.4", [Need::Index(0x1003)], [], forget),
     case!("EMCY 52", "The end of the error is reported with code 0000h", "CiA 301, 7.2.7.1", [Need::Index(0x1014), Need::Index(0x1016)], [], |bench| force(bench, After::End)),
     case!("EMCY 53", "No EMCY message with bit 31 of 1014h set", "CiA 301, 7.5.2.17", [Need::Index(0x1014), Need::Index(0x1016)], [], switched_off),
@@ -75,7 +77,9 @@ enum After {
 }
 
 /// CiA 301, table 26: life guard or heartbeat error.
-const HEARTBEAT_ERROR: u16 = 0x8130;
+pub(super) const HEARTBEAT_ERROR: u16 = 0x8130;
+/// CiA 301, table 26: a PDO is not processed because it is too short.
+const SHORT_PDO: u16 = 0x8210;
 /// How long the heartbeat that is watched may stay away.
 pub(super) const TIME_MS: u32 = 300;
 
@@ -102,36 +106,87 @@ pub(super) async fn beat(bench: &mut Bench, producer: NodeId) {
     bench.pause(ms(5)).await;
 }
 
-async fn force(bench: &mut Bench, after: After) -> Verdict {
+/// An error that the suite has brought about.
+struct Forced {
+    /// The code that its EMCY message has to have.
+    code: u16,
+    /// In words.
+    what: &'static str,
+    within: Duration,
+    /// Who comes back for it to end.
+    producer: Option<NodeId>,
+}
+
+async fn lose_heartbeat(bench: &mut Bench) -> Result<Forced, Finding> {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     let producer = absent_node(bench);
     consume(bench, producer).await?;
     beat(bench, producer).await;
-    let id = bench.emcy_id();
     let within = ms(u64::from(TIME_MS) + 1000);
-    let Some(passed) = bench.wait_for(within, |frame| frame.id() == id).await else {
-        return silent("an EMCY message after a heartbeat that is watched has stayed away", within);
+    let what = "a heartbeat that is watched has stayed away";
+    Ok(Forced { code: HEARTBEAT_ERROR, what, within, producer: Some(producer) })
+}
+
+/// A receive PDO without a byte: of the first one that is in use, or else of one that is set up for it.
+async fn shorten_pdo(bench: &mut Bench) -> Result<Forced, Finding> {
+    if bench.subject.description.pdo.short_rpdo.is_none() {
+        not_applicable!("the device has no 1016h, and reports no PDO that is too short");
+    }
+    // The error of a case before may be there still, and is reported once.
+    bench.reset(NmtCommand::ResetCommunication).await?;
+    let mut id = None;
+    for index in bench.subject.pdos(0x1400) {
+        let cob = CobId(bench.number(Mux::new(index, 1)).await? as u32);
+        let mapped = bench.number(Mux::new(index + 0x200, 0)).await?;
+        let at_once = bench.number(Mux::new(index, 2)).await? >= 254;
+        if cob.is_valid() && mapped > 0 && at_once {
+            id = Some(CanId::standard((cob.0 & 0x7FF) as u16));
+            break;
+        }
+    }
+    let id = match id {
+        Some(id) => id,
+        None => super::pdo::set_up_rpdo(bench, 255).await?.id,
+    };
+    bench.nmt(NmtCommand::Start).await;
+    bench.absorb();
+    bench.send(Frame::new(id, &[]));
+    Ok(Forced { code: SHORT_PDO, what: "a PDO without a byte", within: ms(1000), producer: None })
+}
+
+async fn force(bench: &mut Bench, after: After) -> Verdict {
+    let forced = match bench.subject.description.has_index(0x1016) {
+        true => lose_heartbeat(bench).await?,
+        false => shorten_pdo(bench).await?,
+    };
+    let id = bench.emcy_id();
+    let Some(passed) = bench.wait_for(forced.within, |frame| frame.id() == id).await else {
+        return silent(&format!("an EMCY message after {}", forced.what), forced.within);
     };
     let Some(emcy) = Emcy::parse(&passed.frame).filter(|_| passed.frame.dlc() == 8) else {
         fail!("the EMCY message {} does not have eight bytes", passed.frame);
     };
-    if emcy.code.0 != HEARTBEAT_ERROR && after == After::Message {
-        fail!("the EMCY message has the code {:04X}h; expected {HEARTBEAT_ERROR:04X}h, heartbeat error", emcy.code.0);
+    if emcy.code.0 != forced.code && after == After::Message {
+        fail!("after {} the EMCY message has the code {:04X}h; expected {:04X}h", forced.what, emcy.code.0, forced.code);
     }
     let register = bench.number(REGISTER).await? as u8;
     match after {
         After::Message => Ok(format!("{:04X}h, error register {:02X}h", emcy.code.0, emcy.error_register)),
-        After::Register if register != emcy.error_register => {
-            fail!("1001h is {register:02X}h; the EMCY message has {:02X}h", emcy.error_register)
-        }
-        // Bit 0 is set with any error (CiA 301, 7.5.2.2).
-        After::Register if register & 1 == 0 => {
-            fail!("1001h is {register:02X}h while there is an error: bit 0 is not set")
-        }
-        After::Register => Ok(format!("both {register:02X}h")),
+        After::Register => says_the_same(register, &emcy),
         After::History => kept(bench, emcy.code.0).await,
-        After::End => ended(bench, producer).await,
+        After::End => ended(bench, forced.producer).await,
     }
+}
+
+fn says_the_same(register: u8, emcy: &Emcy) -> Verdict {
+    if register != emcy.error_register {
+        fail!("1001h is {register:02X}h; the EMCY message has {:02X}h", emcy.error_register);
+    }
+    // Bit 0 is set with any error (CiA 301, 7.5.2.2).
+    if register & 1 == 0 {
+        fail!("1001h is {register:02X}h while there is an error: bit 0 is not set");
+    }
+    Ok(format!("both {register:02X}h"))
 }
 
 async fn kept(bench: &mut Bench, code: u16) -> Verdict {
@@ -142,10 +197,12 @@ async fn kept(bench: &mut Bench, code: u16) -> Verdict {
     Ok(format!("{latest:08X}h"))
 }
 
-async fn ended(bench: &mut Bench, producer: NodeId) -> Verdict {
+async fn ended(bench: &mut Bench, producer: Option<NodeId>) -> Verdict {
     let id = bench.emcy_id();
     bench.count(id);
-    beat(bench, producer).await;
+    if let Some(producer) = producer {
+        beat(bench, producer).await;
+    }
     // Of a drive that the loss has brought into Fault the error ends with the reset of that.
     bench.leave_fault().await?;
     // Sooner than the next loss.

@@ -1,11 +1,12 @@
 //! HB 01 to 07: the producer, 1017h, and the consumer, 1016h.
 
-use canopen::{AbortCode, Mux, NmtCommand};
+use canopen::emcy::Emcy;
+use canopen::{AbortCode, Mux, NmtCommand, NmtState};
 
-use super::emcy::{TIME_MS, absent_node, beat, consume};
+use super::emcy::{HEARTBEAT_ERROR, TIME_MS, absent_node, beat, consume};
 use crate::bench::{Bench, SILENCE, ms, refused, silent};
 use crate::case::{Case, Need, case};
-use crate::finding::{Verdict, fail, not_applicable};
+use crate::finding::{Finding, Verdict, fail, not_applicable};
 
 const PERIOD: Mux = Mux::new(0x1017, 0);
 const CONSUMER: Need = Need::Index(0x1016);
@@ -18,9 +19,10 @@ pub(crate) const CASES: &[Case] = &[
     case!("HB 04", "Refuse a node twice in 1016h", "CiA 301, 7.5.2.19", [CONSUMER], [], twice),
     case!("HB 05", "A producer in time is not missed", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], in_time),
     case!("HB 06", "A producer that is late is missed", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], late),
-    case!("HB 07", "The producer's time after a reset is the stored one", "CiA 301, 7.3.2.2.1", [Need::Writable(0x1017)], [], after_reset),
+    case!("HB 07", "After a reset a consumer in operational that misses a heartbeat reports it and leaves operational", "CiA 301, 7.5.2.32", [CONSUMER, Need::Index(0x1014), Need::Writable(0x1017)], [], missed_in_operational),
     case!("HB 51", "The heartbeat says the NMT state", "CiA 301, 7.2.8.3.2", [Need::Writable(0x1017)], ["heartbeat_tells_alarm"], says_state),
     case!("HB 52", "A consumer waits for the first heartbeat", "CiA 301, 7.2.8.3.2", [CONSUMER, Need::Index(0x1014)], [], waits_for_first),
+    case!("HB 53", "The producer's time after a reset is the stored one", "CiA 301, 7.3.2.2.1", [Need::Writable(0x1017)], [], after_reset),
 ];
 
 async fn writable(bench: &mut Bench) -> Verdict {
@@ -111,6 +113,43 @@ async fn waits_for_first(bench: &mut Bench) -> Verdict {
         Some(passed) => fail!("{} came though no heartbeat ever came", passed.frame),
         None => Ok("nothing is missed before the first heartbeat".into()),
     }
+}
+
+/// Pre-operational, if 1029h:01 does not ask for another state.
+async fn after_error(bench: &mut Bench) -> Result<NmtState, Finding> {
+    let behaviour = Mux::new(0x1029, 1);
+    if bench.subject.description.row(behaviour).is_none() {
+        return Ok(NmtState::PreOperational);
+    }
+    match bench.number(behaviour).await? {
+        0 => Ok(NmtState::PreOperational),
+        1 => Ok(NmtState::Operational),
+        2 => Ok(NmtState::Stopped),
+        other => not_applicable!("1029h:01 is {other}, a behaviour of the maker's"),
+    }
+}
+
+async fn missed_in_operational(bench: &mut Bench) -> Verdict {
+    bench.reset(NmtCommand::ResetNode).await?;
+    let expected = after_error(bench).await?;
+    bench.start_heartbeat().await?;
+    let producer = absent_node(bench);
+    consume(bench, producer).await?;
+    bench.nmt(NmtCommand::Start).await;
+    beat(bench, producer).await;
+    bench.expect_state(NmtState::Operational).await?;
+    let id = bench.emcy_id();
+    let Some(passed) = bench.wait_for(ms(1000), |frame| frame.id() == id).await else {
+        return silent(&format!("an EMCY message after {TIME_MS} ms without a heartbeat"), ms(1000));
+    };
+    match Emcy::parse(&passed.frame) {
+        Some(emcy) if emcy.code.0 == HEARTBEAT_ERROR => {}
+        _ => fail!("{} does not have the code {HEARTBEAT_ERROR:04X}h, heartbeat error", passed.frame),
+    }
+    // One may have waited for the bus.
+    bench.pause(ms(20)).await;
+    bench.expect_state(expected).await?;
+    Ok(format!("{}, and {expected}", passed.frame))
 }
 
 async fn after_reset(bench: &mut Bench) -> Verdict {

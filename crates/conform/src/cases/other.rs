@@ -1,5 +1,6 @@
 //! OTHER 01 to 10: signatures of store and restore, the date of the configuration, identifiers that nothing may use.
 
+use canopen::od::Entry;
 use canopen::{AbortCode, CobId, Mux, NmtCommand};
 
 use crate::bench::{Bench, refused};
@@ -21,7 +22,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("OTHER 08", "Refuse the signature backwards for 1011h:02", "CiA 301, 7.5.2.14", [Need::Sub(0x1011, 2)], [], |bench| wrong_signature(bench, 0x1011, 2, *b"daol")),
     case!("OTHER 09", "1020h is kept by save, and is 0 once another command changes what is saved", "CiA 301, 7.5.2.23", [Need::Index(0x1020), STORE, Need::Store], [], configuration_date),
     case!("OTHER 10", "Refuse identifiers that nothing may use", "CiA 301, 7.3.5", [], [], restricted),
-    case!("OTHER 51", "1010h says how it stores, with bit 0 or 1", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
+    case!("OTHER 51", "1010h and 1011h say what they do with bits 0 and 1, and nothing else", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
     case!("OTHER 52", "Saved values are there after a reset, and delivered ones after a restore", "CiA 301, 7.5.2.14", [STORE, Need::Writable(0x1017), Need::Store], [], save_and_reset),
 ];
 
@@ -33,11 +34,18 @@ async fn wrong_signature(bench: &mut Bench, index: u16, sub_index: u8, signature
 }
 
 async fn says_how(bench: &mut Bench) -> Verdict {
-    let says = bench.number(Mux::new(0x1010, 1)).await?;
-    if says & !3 != 0 {
-        fail!("1010h:01 is {says:08X}h: bits 2 to 31 are reserved");
+    let mut seen = Vec::new();
+    for (index, meant) in [(0x1010, 0b11), (0x1011, 0b1)] {
+        let rows = bench.subject.rows().filter(|row| row.index == index && row.sub_index > 0 && row.access.is_readable());
+        for mux in rows.map(Entry::mux) {
+            let says = bench.number(mux).await?;
+            if says & !meant != 0 {
+                fail!("{mux} is {says:08X}h: all bits but {meant:b}b are reserved");
+            }
+            seen.push(format!("{mux} {says:X}h"));
+        }
     }
-    Ok(format!("{says:08X}h"))
+    Ok(seen.join(", "))
 }
 
 async fn configuration_date(bench: &mut Bench) -> Verdict {
@@ -73,9 +81,9 @@ async fn changed_date(bench: &mut Bench, date: Mux) -> Verdict {
     }
 }
 
-/// The first and last identifiers of each range that CiA 301, 7.3.5 reserves.
-const RESTRICTED: [u32; 14] =
-    [0x000, 0x001, 0x07F, 0x101, 0x180, 0x581, 0x5FF, 0x601, 0x67F, 0x6E0, 0x6FF, 0x701, 0x77F, 0x7FF];
+/// The identifiers that CiA 301, 7.3.5 reserves, ends included.
+const RESTRICTED: [(u32, u32); 6] =
+    [(0x000, 0x07F), (0x101, 0x180), (0x581, 0x5FF), (0x601, 0x67F), (0x6E0, 0x6FF), (0x701, 0x7FF)];
 
 async fn restricted(bench: &mut Bench) -> Verdict {
     bench.nmt(NmtCommand::EnterPreOperational).await;
@@ -87,8 +95,9 @@ async fn restricted(bench: &mut Bench) -> Verdict {
     let mut checked = 0;
     for mux in objects.filter(writable) {
         switch_off(bench, mux).await?;
-        for id in RESTRICTED {
-            let answer = bench.try_write(mux, &id.to_le_bytes()).await?;
+        bench.touch(mux).await?;
+        for id in RESTRICTED.into_iter().flat_map(|(first, last)| first..=last) {
+            let answer = bench.download(mux, &id.to_le_bytes()).await?;
             refused(&format!("{id:03X}h for {mux}"), &answer, &codes)?;
             checked += 1;
         }

@@ -321,16 +321,17 @@ async fn inhibit_time(bench: &mut Bench) -> Verdict {
     bench.write(inhibit, &(INHIBIT_MS * 10).to_le_bytes()).await?;
     bench.switch_on(tpdo.index, tpdo.id).await?;
     bench.nmt(NmtCommand::Start).await;
-    let mut times = Vec::new();
     of(bench, tpdo, ms(u64::from(INHIBIT_MS) * 2)).await;
+    bench.count(tpdo.id);
     for _ in 0..4 {
         if !bench.change(row).await? {
             not_applicable!("no object that can be mapped is changed by a write");
         }
-        times.extend(bench.collect(ms(20), |frame| frame.id() == tpdo.id).await);
+        bench.pause(ms(20)).await;
     }
-    times.extend(bench.collect(ms(300), |frame| frame.id() == tpdo.id).await);
-    let gaps = times.windows(2).map(|pair| (pair[1].at - pair[0].at).as_millis());
+    bench.pause(ms(300)).await;
+    let times = bench.counted_at();
+    let gaps = times.windows(2).map(|pair| (pair[1] - pair[0]).as_millis());
     match gaps.min() {
         None => silent("a second PDO after four changes", ms(300)),
         // A millisecond: when the wire took the first one is the device's to say.
@@ -342,7 +343,7 @@ async fn inhibit_time(bench: &mut Bench) -> Verdict {
 }
 
 /// A receive PDO of one setting, and another value of that.
-async fn set_up_rpdo(bench: &mut Bench, transmission: u8) -> Result<Receiving, Finding> {
+pub(super) async fn set_up_rpdo(bench: &mut Bench, transmission: u8) -> Result<Receiving, Finding> {
     bench.nmt(NmtCommand::EnterPreOperational).await;
     let Some(index) = bench.subject.pdos(0x1400).next() else { not_applicable!("the device has no receive PDO") };
     let Some(row) = bench.receivable() else { not_applicable!("no setting can be mapped into a receive PDO") };
@@ -365,8 +366,8 @@ async fn set_up_rpdo(bench: &mut Bench, transmission: u8) -> Result<Receiving, F
     Ok(Receiving { id, mux: row.mux(), before, value })
 }
 
-struct Receiving {
-    id: can::CanId,
+pub(super) struct Receiving {
+    pub(super) id: can::CanId,
     mux: Mux,
     before: Vec<u8>,
     value: Vec<u8>,

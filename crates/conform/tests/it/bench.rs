@@ -1,17 +1,18 @@
 //! A bus with one node on it, and the suite.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use can::{Bitrate, Station, Tap};
-use canopen::NodeId;
+use canopen::{Mux, NodeId};
 use conform::{Capture, CaseResult, Options, Outcome, Report, Subject, Suite};
 use devices::Description;
 use master::Network;
 use sim::machine::{Order, order};
-use sim::{Fidelity, VirtualDrive, World, block_on_for};
+use sim::{Fidelity, VirtualDrive, World, block_on, block_on_for};
 
 /// Longer than the whole suite takes.
-const LIMIT: Duration = Duration::from_secs(3600);
+pub(crate) const LIMIT: Duration = Duration::from_secs(3600);
 
 pub(crate) fn node() -> NodeId {
     NodeId::new(5).unwrap()
@@ -25,6 +26,27 @@ pub(crate) fn drive(description: &'static Description) -> Box<dyn VirtualDrive> 
 /// The same with as much computed.
 pub(crate) fn drive_with(description: &'static Description, fidelity: Fidelity) -> Box<dyn VirtualDrive> {
     order(description, &Order { fidelity, ..Order::new(description, node(), Bitrate::K500) }).unwrap()
+}
+
+/// All values that can be written and read back. 1003h is left out: it keeps the errors that cases have provoked.
+pub(crate) fn values(
+    world: &mut World,
+    network: &Network,
+    description: &'static Description,
+) -> BTreeMap<Mux, Vec<u8>> {
+    let device = network.node(node());
+    let rows = description.dictionary.rows().iter().filter(|row| row.access.is_writable() && row.access.is_readable());
+    let rows: Vec<_> = rows.filter(|row| row.index != 0x1003).collect();
+    block_on(world, async {
+        let mut found = BTreeMap::new();
+        for row in rows {
+            if let Ok(value) = device.upload(row.mux()).await {
+                found.insert(row.mux(), value.as_bytes().to_vec());
+            }
+        }
+        found
+    })
+    .unwrap()
 }
 
 /// Runs the suite against a station that is node 5.

@@ -30,6 +30,7 @@ const ROWS: &[Row] = &[
     (0x1018, 0, U8, "const", "4", NO, &[]), (0x1018, 1, U32, "ro", "0x11", NO, &[]), (0x1018, 2, U32, "ro", "0x22", NO, &[]),
     (0x1018, 3, U32, "ro", "0x33", NO, &[]), (0x1018, 4, U32, "ro", "0x44", NO, &[]),
     (0x1019, 0, U8, "rw", "0", NO, &[]),
+    (0x1029, 0, U8, "const", "1", NO, &[]), (0x1029, 1, U8, "rw", "0", NO, &[]),
     (0x1200, 0, U8, "const", "2", NO, &[]), (0x1200, 1, U32, "ro", "$NODEID+0x600", NO, &[]), (0x1200, 2, U32, "ro", "$NODEID+0x580", NO, &[]),
     (0x1400, 0, U8, "const", "2", NO, &[]), (0x1400, 1, U32, "rw", "$NODEID+0x200", NO, &[]), (0x1400, 2, U8, "rw", "255", NO, &[]),
     (0x1600, 0, U8, "rw", "1", NO, &[]), (0x1600, 1, U32, "rw", "0x20030008", NO, &[]), (0x1600, 2, U32, "rw", "0", NO, &[]),
@@ -79,6 +80,11 @@ pub(crate) fn without_remote_frames() -> &'static Description {
 /// The same without SYNC.
 pub(crate) fn without_sync() -> &'static Description {
     described(ROWS.iter().filter(|row| !matches!(row.0, 0x1005 | 0x1006 | 0x1019)).copied().collect())
+}
+
+/// The same without a heartbeat consumer.
+pub(crate) fn without_consumer() -> &'static Description {
+    described(ROWS.iter().filter(|row| row.0 != 0x1016).copied().collect())
 }
 
 /// The same with a SYNC start value, the date of the configuration, and a second SDO server, off as delivered.

@@ -145,6 +145,12 @@ impl Description {
         of_device.chain(forms).chain(self.of_objects()).chain(axes).chain(stated)
     }
 
+    /// Where the [`manual`](Self::manual) states a departure; `None` where that is not known.
+    pub fn section_of(&self, departure: &Departure) -> Option<&'static str> {
+        let stated = self.sections.iter().find(|part| part.departure == departure.key());
+        stated.map(|part| part.section).or_else(|| self.section(departure.object()?.index))
+    }
+
     fn of_identity(&self, known: Catalogue<'_>) -> [Option<Departure>; 2] {
         let shared = known.same_identity(self).any(|other| other.name != self.name);
         let siblings = known.same_identity(self).filter(|other| !other.same_objects(self));

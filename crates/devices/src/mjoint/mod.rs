@@ -183,6 +183,16 @@ const SECTIONS: &[Section] = &[
     Section::of(0x1400, 0x1603, "5.08.2"),
     Section::of(0x1800, 0x1A03, "5.08.3"),
     Section::of(0x2600, 0x60FF, "5.04 control"),
+    // What is not there stands in none of them.
+    Section::stating("no_error_history", "5.04"),
+    Section::stating("no_store_parameters", "5.04, 2614h"),
+    Section::stating("no_emcy", "5.04; Status indication and alarm"),
+    Section::stating("no_supported_drive_modes", "5.04"),
+    Section::stating("starts_operational", "5.11.1"),
+    Section::stating("heartbeat_tells_alarm", "5.11.1"),
+    Section::stating("tpdo_answers_rpdo", "5.08, 5.10"),
+    Section::stating("new_set_point_clears_itself", "note at 5.06.2"),
+    Section::stating("homing_starts_with_mode", "5.09"),
 ];
 
 /// Bits of 5.04 as the examples show them.

@@ -17,7 +17,7 @@ pub(crate) const fn cause(why: &'static str, cases: &'static [&'static str]) -> 
 pub(crate) const ANSWERS: Cause = cause("They ask the SDO server, and look at each answer.", &["*"]);
 pub(crate) const PERIOD: Cause = cause(
     "They write the period to 1017h and listen to the heartbeats that come of it.",
-    &["HBG 04", "HBG 05", "HBG 06", "HBG 07", "HB 02", "HB 51"],
+    &["HBG 04", "HBG 05", "HBG 06", "HBG 07", "HB 02", "HB 07", "HB 51"],
 );
 pub(crate) const PERIOD_AND_OFF: Cause =
     cause("They write a period to 1017h, hear a heartbeat, and then write 0.", &["HBG 02", "HB 03"]);

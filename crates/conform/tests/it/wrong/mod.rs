@@ -2,6 +2,7 @@
 
 mod causes;
 mod communication;
+mod drawn;
 mod drive;
 mod objects;
 mod process_data;
@@ -15,9 +16,12 @@ use devices::Description;
 use sim::Fidelity;
 
 use crate::bench::{drive_with, node, run, shown};
-use crate::complete::{complete, extended, producing_sync, with_fixed_mappings, without_remote_frames, without_sync};
+use crate::complete::{
+    complete, extended, producing_sync, with_fixed_mappings, without_consumer, without_remote_frames, without_sync,
+};
 use causes::Cause;
-use station::{Kind, Wrong, abort, writes, written};
+use station::{abort, writes, written};
+pub(crate) use station::{Kind, Wrong, answer, reads};
 
 /// A node that is right but for one thing.
 pub(crate) struct Defect {
@@ -192,6 +196,15 @@ fn each_defect_fails_its_case_3() {
 #[test]
 fn each_defect_fails_its_case_4() {
     part(3);
+}
+
+#[test]
+fn an_error_is_forced_by_a_short_pdo_where_there_is_no_1016h() {
+    let options = Options { only: vec!["EMCY".into()], ..without_drives() };
+    let report = report_of(without_consumer(), Kind::Right, options.clone());
+    let of = |id: &str| report.cases.iter().find(|case| case.id == id).map(|case| case.result);
+    assert_eq!(["EMCY 04", "EMCY 05", "EMCY 06"].map(of), [Some(Outcome::Pass); 3], "{}", shown(&report, |_| true));
+    check(&communication::OF_SHORT_PDOS.iter().collect::<Vec<_>>(), without_consumer(), &options);
 }
 
 #[test]

@@ -66,6 +66,7 @@ pub(crate) static DEFECTS: &[Defect] = &[
     defect("a wrong signature restores the communication", "OTHER 07", &[], Answer(|_, r| (writes(&r, 0x1011, 2) && written(&r) == u32::from_le_bytes(*b"wron")).then(|| confirm(&r)))),
     defect("the signature backwards restores the communication", "OTHER 08", &[], Answer(|_, r| (writes(&r, 0x1011, 2) && written(&r) == u32::from_le_bytes(*b"daol")).then(|| confirm(&r)))),
     defect("1014h takes an identifier of SDO", "OTHER 10", &[], Answer(|_, r| (writes(&r, 0x1014, 0) && written(&r) == 0x601).then(|| confirm(&r)))),
+    defect("1014h takes 050h", "OTHER 10", &[], Answer(|_, r| (writes(&r, 0x1014, 0) && written(&r) == 0x050).then(|| confirm(&r)))),
     defect("1010h:01 has reserved bits", "OTHER 51", &[], Alter(|m, a| if reads(&m.request, 0x1010, 1) { answer(&a, 0x43, 5) } else { a })),
     defect("a save stores nothing", "OTHER 52", &[cause("They save another value and look for it after a reset.", &["SYNC 08", "SYNC 10"])], Answer(|_, r| (writes(&r, 0x1010, 1) && written(&r) == u32::from_le_bytes(*b"save")).then(|| confirm(&r)))),
 ];

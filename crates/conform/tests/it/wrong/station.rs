@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use can::{CanId, Frame, Instant, Station};
 use sim::VirtualDrive;
 
+use super::drawn::Change;
+
 /// What the wrapper knows of the traffic.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Memory {
@@ -48,6 +50,8 @@ pub(crate) enum Kind {
     Every(u64, fn(&mut Memory, Frame) -> Option<Vec<Frame>>, fn(&mut Memory) -> Vec<Frame>),
     /// Frames that go out in addition when the node hears one.
     Add(fn(&mut Memory, Frame) -> Vec<Frame>),
+    /// What was drawn by chance: an answer in place of the node's, or the node's with something changed.
+    Drawn(Change),
 }
 
 /// A drive behind its defect. It has power from the beginning.
@@ -137,7 +141,12 @@ impl Station for Wrong {
                 }
             }
             Kind::Add(add) => self.out.extend(add(&mut self.memory, *frame)),
-            Kind::Right | Kind::Answer(_) | Kind::Alter(_) | Kind::Say(_) => {}
+            Kind::Drawn(change) if !stopped => {
+                if let Some(answers) = request(frame).and_then(|asked| change.answer(asked)) {
+                    return self.out.extend(answers.map(reply));
+                }
+            }
+            Kind::Right | Kind::Drawn(_) | Kind::Answer(_) | Kind::Alter(_) | Kind::Say(_) => {}
         }
         self.drive.handle_frame(frame, now);
     }
@@ -158,6 +167,9 @@ impl Station for Wrong {
             match self.kind {
                 Kind::Alter(alter) if frame.standard_data_id() == Some(0x580 + NODE) => {
                     self.out.push_back(reply(alter(&mut self.memory, *frame.padded())));
+                }
+                Kind::Drawn(change) if frame.standard_data_id() == Some(0x580 + NODE) => {
+                    self.out.push_back(reply(change.alter(&self.memory.request, *frame.padded())));
                 }
                 Kind::Say(say) => self.out.extend(say(&mut self.memory, frame)),
                 _ => self.out.push_back(frame),

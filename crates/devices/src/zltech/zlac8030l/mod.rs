@@ -115,7 +115,12 @@ const LOOPS: Loops = Loops {
 };
 
 /// All objects are in one list.
-const SECTIONS: &[Section] = &[Section::of(0x1000, 0x6FFF, "chapter 9")];
+const SECTIONS: &[Section] = &[
+    Section::of(0x1000, 0x6FFF, "chapter 9"),
+    Section::stating("pdo_timers", "6.1"),
+    Section::stating("status_bit", "chapter 7"),
+    Section::stating("warning_bit_in_fault", "both siblings' manuals"),
+];
 
 /// Chapter 5 and 2030h: of the functions of X0 and X1 only 9 stops the motor; B0 holds it with 1.
 const TERMINALS: Terminals = Terminals {

@@ -81,7 +81,15 @@ const AXIS: AxisDescription = AxisDescription {
 };
 
 /// All objects are in one list.
-const SECTIONS: &[Section] = &[Section::of(0x1000, 0x6FFF, "5.4")];
+const SECTIONS: &[Section] = &[
+    Section::of(0x1000, 0x6FFF, "5.4"),
+    // The sibling's manual has the unit.
+    Section::stating("pdo_timers", "6.1 of the ZLAC8030L's"),
+    Section::stating("homing_shown_by", "5.3.6"),
+    Section::stating("status_bit", "5.3.2"),
+    Section::stating("warning_bit_in_fault", "5.3.1 and 5.3.2"),
+    Section::stating("energised_when_switched_on", "5.3.2"),
+];
 
 /// 3.2 and 2030h: each input may be any of these; the drive has no brake.
 const TERMINALS: Terminals = Terminals {
