@@ -177,7 +177,9 @@ impl fmt::Display for Need {
             Self::Writable(index) => write!(f, "the device has no object {index:04X}h that can be written"),
             Self::Sub(index, sub_index) => write!(f, "the device has no object {}", Mux::new(*index, *sub_index)),
             Self::FurtherServer => f.write_str("the device has no SDO server beside the first one: 1201h to 127Fh"),
-            Self::AnError => f.write_str("the device has neither 1016h nor a receive PDO: nothing brings an error about"),
+            Self::AnError => {
+                f.write_str("the device has neither 1016h nor a receive PDO: nothing brings an error about")
+            }
             Self::Rpdo => f.write_str("the device has no receive PDO"),
             Self::Tpdo => f.write_str("the device has no transmit PDO"),
             Self::Lss => f.write_str("the device is not said to have LSS"),

@@ -21,7 +21,7 @@ pub fn html(report: &Report) -> String {
     }
     let _ = writeln!(
         out,
-        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own. This is a report of a test, not a certificate of CiA.</footer>",
+        "<footer>Made by ferrodrive conform {}. Case numbers up to 50 are those that CiA's conformance test prints; numbers from 51 on and 402 are the suite's own, and what OD 07 and OD 08 ask. This is a report of a test, not a certificate of CiA.</footer>",
         env!("CARGO_PKG_VERSION")
     );
     plot::html::page(&format!("CANopen conformance: {}, node {}", report.model, report.node), &out)

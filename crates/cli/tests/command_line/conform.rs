@@ -1,6 +1,10 @@
 //! `ferrodrive conform`: what it prints and writes, and what it ends with.
 
-use processes::{done, ferrodrive, page, scratch};
+#![allow(clippy::print_stderr, reason = "a test that is skipped says why")]
+
+use std::process::{Command, Stdio};
+
+use processes::{done, ferrodrive, page, program, scratch};
 
 #[test]
 fn a_model_passes_and_its_departures_are_cited() {
@@ -67,6 +71,25 @@ fn cases_are_chosen_by_number_and_group() {
     let unknown = ferrodrive(&["conform", "4", "--only", "SDO 99"]);
     assert_eq!(unknown.status, Some(2));
     assert!(unknown.err.contains("got 'SDO 99'"), "{}", unknown.err);
+}
+
+/// In a terminal that `script` (util-linux) makes.
+#[cfg(unix)]
+#[test]
+fn a_terminal_shows_how_far_it_is() {
+    if Command::new("script").arg("--version").output().is_err() {
+        eprintln!("skipped: there is no `script` here, which gives a command a terminal");
+        return;
+    }
+    let line = format!("stty cols 120 rows 24; exec {} conform 4 --only 'SDO 01,SDO 05'", program());
+    let mut script = Command::new("script");
+    script.args(["-q", "-e", "-c", &line, "/dev/null"]).stdin(Stdio::null());
+    script.env("TERM", "xterm").env("NO_COLOR", "1").env_remove("FERRODRIVE_BUS").env_remove("FERRODRIVE_MACHINE");
+    let ended = script.output().expect("script runs");
+    let shown = String::from_utf8_lossy(&ended.stdout);
+    assert!(ended.status.success() && shown.contains("1 of 2: SDO 01 Read 1000h"), "{shown}");
+    let cleared = shown.rfind("of 2: SDO 0").zip(shown.find("node 4: "));
+    assert!(cleared.is_some_and(|(progress, table)| progress < table), "the table comes after it: {shown}");
 }
 
 #[test]

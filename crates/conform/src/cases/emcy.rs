@@ -167,7 +167,12 @@ async fn force(bench: &mut Bench, after: After) -> Verdict {
         fail!("the EMCY message {} does not have eight bytes", passed.frame);
     };
     if emcy.code.0 != forced.code && after == After::Message {
-        fail!("after {} the EMCY message has the code {:04X}h; expected {:04X}h", forced.what, emcy.code.0, forced.code);
+        fail!(
+            "after {} the EMCY message has the code {:04X}h; expected {:04X}h",
+            forced.what,
+            emcy.code.0,
+            forced.code
+        );
     }
     let register = bench.number(REGISTER).await? as u8;
     match after {

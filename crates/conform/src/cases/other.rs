@@ -36,7 +36,8 @@ async fn wrong_signature(bench: &mut Bench, index: u16, sub_index: u8, signature
 async fn says_how(bench: &mut Bench) -> Verdict {
     let mut seen = Vec::new();
     for (index, meant) in [(0x1010, 0b11), (0x1011, 0b1)] {
-        let rows = bench.subject.rows().filter(|row| row.index == index && row.sub_index > 0 && row.access.is_readable());
+        let rows =
+            bench.subject.rows().filter(|row| row.index == index && row.sub_index > 0 && row.access.is_readable());
         for mux in rows.map(Entry::mux) {
             let says = bench.number(mux).await?;
             if says & !meant != 0 {

@@ -123,3 +123,28 @@ fn each_cargo_line_names_a_package_and_a_test_that_exist() {
         }
     }
 }
+
+/// The line of the workflow that asks the device, as it stands there: on a virtual bus in place of the runner's interface.
+#[test]
+fn the_workflow_on_conformance_asks_the_device_and_writes_what_it_keeps() {
+    let text = std::fs::read_to_string(root().join("docs/handbook/ci.md")).expect("the page is there");
+    let workflows = blocks(&text, "yaml").into_iter().map(|(_, block)| block);
+    let workflow = workflows.into_iter().find(|block| block[0] == "name: conformance").expect("a workflow");
+    let line =
+        workflow.iter().find_map(|line| line.trim().strip_prefix("- run: ferrodrive conform ")).expect("its line");
+    let words: Vec<&str> = ["conform"].into_iter().chain(line.split_whitespace()).collect();
+    let folder = processes::scratch("handbook-conformance");
+    std::fs::copy(root().join("crates/words/src/models/io401.eds"), folder.join("my-device.eds")).expect("an EDS");
+    std::fs::write(folder.join("machine.toml"), "[[drive]]\nmodel = \"my-device.eds\"\nnode = 5\n").expect("a file");
+    let mut command = processes::command(&words);
+    let ended =
+        command.current_dir(&*folder).env("FERRODRIVE_BUS", "sim:machine.toml").output().expect("the binary runs");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{said}{}", String::from_utf8_lossy(&ended.stdout));
+    for (file, part) in [("conformance.xml", "<testsuite"), ("conformance.html", "No case failed")] {
+        let written = std::fs::read_to_string(folder.join(file)).expect("it is written");
+        assert!(written.contains(part), "{file}: {written}");
+    }
+    let kept = workflow.iter().any(|line| line.trim() == "path: conformance.*");
+    assert!(kept, "what is written is what the workflow keeps");
+}

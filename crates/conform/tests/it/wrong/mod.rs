@@ -20,8 +20,8 @@ use crate::complete::{
     complete, extended, producing_sync, with_fixed_mappings, without_consumer, without_remote_frames, without_sync,
 };
 use causes::Cause;
-use station::{abort, writes, written};
 pub(crate) use station::{Kind, Wrong, answer, reads};
+use station::{abort, writes, written};
 
 /// A node that is right but for one thing.
 pub(crate) struct Defect {
@@ -77,11 +77,21 @@ fn judged(defect: &Defect, report: &Report) -> Option<String> {
     ))
 }
 
+/// The case that asks more than all others together: it writes every restricted identifier to every COB-ID, and looks at nothing
+/// but the answers.
+const LONGEST: &str = "OTHER 10";
+
+/// Each defect against all cases of the options; against the longest one only if it is to fail.
 fn check(defects: &[&Defect], description: &'static Description, options: &Options) {
-    let wrong: Vec<String> = defects
-        .iter()
-        .filter_map(|defect| judged(defect, &report_of(description, defect.kind, options.clone())))
-        .collect();
+    let report = |defect: &Defect| {
+        let mut options = options.clone();
+        let listed = || defect.also.iter().flat_map(|cause| cause.cases);
+        if defect.fails != LONGEST && !listed().any(|case| [LONGEST, "*"].contains(case)) {
+            options.skip.push(LONGEST.into());
+        }
+        report_of(description, defect.kind, options)
+    };
+    let wrong: Vec<String> = defects.iter().filter_map(|defect| judged(defect, &report(defect))).collect();
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), defects.len(), wrong.join("\n"));
 }
 
