@@ -186,7 +186,7 @@ impl Bench {
     }
 }
 
-/// An abort of a request about an object. That it names none is for SDO 53 to judge; an abort about another is no answer to this.
+/// An abort of a request about an object. That it names none is for SDO 53 to judge; an abort about another does not answer this one.
 fn aborted<T>(asked: Mux, about: Mux, code: AbortCode) -> Result<SdoResult<T>, Finding> {
     if about != asked && about != Mux::new(0, 0) {
         fail!("the request was about {asked}, and is aborted as one about {about}: {code}");

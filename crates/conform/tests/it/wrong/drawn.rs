@@ -1,4 +1,4 @@
-//! Wrong nodes that nobody chose: what an SDO server does is changed by chance, from a seed, without a look at what the cases ask.
+//! Wrong nodes that were drawn: what an SDO server does is changed by chance, from a seed, without a look at what the cases ask.
 
 use std::cell::Cell;
 use std::future::{Future, poll_fn};
