@@ -138,8 +138,8 @@ async fn client_abort(bench: &mut Bench) -> Verdict {
 
 async fn new_request(bench: &mut Bench) -> Verdict {
     begin_upload(bench).await?;
-    // The server may refuse the first request, and with it end what is under way.
-    if let Err(code) = bench.upload(DEVICE_TYPE).await? {
+    // The server may refuse the first request, and with it end what is under way, which its abort may name.
+    if let Err(code) = aborted(&bench.exchange(Request::InitiateUpload(DEVICE_TYPE).emit()).await?) {
         let data = bench.read(DEVICE_TYPE).await?;
         return Ok(format!("aborted with {code}; then 1000h is read as {}", hex(&data)));
     }
