@@ -43,7 +43,7 @@ impl Exchange {
         (Self { client, node, buffer, result: None }, old)
     }
 
-    /// The next frame, taken by the other side; `None` where nobody sends any more.
+    /// The next frame, taken by the other side; `None` where neither has one left.
     fn step(&mut self) -> Option<Frame> {
         if let Some(request) = self.client.poll_transmit(&self.buffer) {
             self.node.handle_frame(&request, Instant::ZERO);
