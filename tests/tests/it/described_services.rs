@@ -185,6 +185,25 @@ fn eight_nodes_are_watched_by_whichever_of_127_entries() {
 }
 
 /// CiA 301, 7.5.2.23: 1020h is 0 once something else than the tool that wrote it has changed what the device starts with.
+/// CiA 301, 7.5.2.32: by default a device in operational enters pre-operational; 1029h is there to have it otherwise.
+#[test]
+fn a_lost_heartbeat_ends_operational_where_no_1029h_says_otherwise() {
+    let mut bench = Bench::new(&[
+        (0x1000, 0, U32, "ro", 0, false),
+        (0x1001, 0, U8, "ro", 0, false),
+        (0x1016, 0, U8, "ro", 1, false),
+        (0x1016, 1, U32, "rw", 0x0032_0032, false),
+        (0x1017, 0, U16, "rw", 10, false),
+    ]);
+    bench.send("000#0109");
+    bench.send("732#05");
+    assert!(bench.run(45).iter().all(|frame| frame == "709#05"));
+    assert_eq!(bench.run(30).last().map(String::as_str), Some("709#7F"));
+    // Heartbeats that come again leave it to the master to start it.
+    bench.send("732#05");
+    assert_eq!(bench.run(30).last().map(String::as_str), Some("709#7F"));
+}
+
 #[test]
 fn the_date_of_the_configuration_is_kept_until_another_configuration_is_stored() {
     const SAVE: u32 = u32::from_le_bytes(*b"save");

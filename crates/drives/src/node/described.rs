@@ -175,14 +175,13 @@ impl<S: Storage> DescribedDevice<S> {
         self.services.poll_timeout().into_iter().chain(lss).min().filter(|_| self.device.is_running())
     }
 
-    /// 1029h:01 says what a device that loses its connection does to its own NMT state (CiA 301, 7.5.2.32).
+    /// What a device that loses its connection does to its own NMT state: 1029h:01, and without the object it enters pre-operational
+    /// (CiA 301, 7.5.2.32).
     fn follow_error_behaviour(&mut self, now: Instant) {
         let state = self.device.node().state();
-        match error_behaviour(self.device.values()) {
-            Some(0) if state == NmtState::Operational => {
-                self.device.command_itself(NmtCommand::EnterPreOperational, now);
-            }
-            Some(2) => self.device.command_itself(NmtCommand::Stop, now),
+        match error_behaviour(self.device.values()).unwrap_or(0) {
+            0 if state == NmtState::Operational => self.device.command_itself(NmtCommand::EnterPreOperational, now),
+            2 => self.device.command_itself(NmtCommand::Stop, now),
             _ => {}
         }
     }
