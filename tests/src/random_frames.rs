@@ -167,7 +167,7 @@ fn download(seeded: &mut Seeded, object: (u16, u8)) -> Vec<[u8; 8]> {
     let segments = data.chunks(7).len();
     for (number, bytes) in data.chunks(7).enumerate() {
         let last = if number + 1 == segments { 0x80 } else { 0 };
-        let mut raw = [number as u8 + 1 | last, 0, 0, 0, 0, 0, 0, 0];
+        let mut raw = [(number as u8 + 1) | last, 0, 0, 0, 0, 0, 0, 0];
         raw[1..=bytes.len()].copy_from_slice(bytes);
         requests.push(raw);
     }
