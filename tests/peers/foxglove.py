@@ -237,7 +237,7 @@ def of_studio(bench):
 def client_modules():
     """The folder of the client, installed now if need be."""
     if not shutil.which("npm"):
-        raise Skip("there is no npm here: apt install npm")
+        raise Skip("npm is missing: apt install npm")
     folder = pathlib.Path(__file__).resolve().parents[2] / "target" / "npm" / "foxglove"
     folder.mkdir(parents=True, exist_ok=True)
     stamp = folder / "installed.txt"

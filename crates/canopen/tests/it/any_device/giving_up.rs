@@ -60,8 +60,11 @@ impl Exchange {
 fn client_gives_up_after_each_frame(begin: fn(&mut Client, &[u8])) -> usize {
     for frames in 0.. {
         let (mut exchange, old) = Exchange::begun(begin);
+        // The end of a download, with five bytes of the last segment unused, makes its value that of the object; nothing before does.
+        let mut has_ended = false;
         for _ in 0..frames {
-            exchange.step().expect("a frame of the transfer");
+            let frame = exchange.step().expect("a frame of the transfer");
+            has_ended |= frame.to_string().starts_with("604#D5");
         }
         if !exchange.client.is_busy() {
             assert!(matches!(exchange.result, Some(Ok(_))), "{:?}", exchange.result);
@@ -74,9 +77,8 @@ fn client_gives_up_after_each_frame(begin: fn(&mut Client, &[u8])) -> usize {
         let of_client: Vec<_> = sent.iter().filter(|frame| frame.starts_with("604")).collect();
         assert_eq!(of_client, [ABORT], "after {frames} frames");
         assert_eq!(exchange.result, None, "after {frames} frames");
-        let new = Numbers(4).bytes(BYTES);
-        let now = upload(&mut exchange.node, VALUE).unwrap();
-        assert!(now == old || now == new && exchange.buffer == new, "half a value after {frames} frames");
+        let expected = if has_ended { Numbers(4).bytes(BYTES) } else { old };
+        assert_eq!(upload(&mut exchange.node, VALUE).unwrap(), expected, "after {frames} frames");
         // The same client goes on with another object.
         exchange.client.upload(Mux::new(0x2007, 0), Instant::ZERO);
         while exchange.result.is_none() {
