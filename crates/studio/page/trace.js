@@ -29,6 +29,9 @@ const FORMS = [
   ["blf", "BLF"],
   ["pcapng", "pcapng"],
 ];
+/** Frames of a loaded log that are asked for at once: each of them may be a line. */
+const WINDOW = 2000;
+const WINDOW_IDENTIFIERS = 20_000;
 /** Lines before and after the cursor of the scope that are fetched for it. */
 const AROUND_S = 1;
 const COLUMNS = ["Time (s)", "From", "COB-ID", "What", "Bytes", "Took", "In words"];
@@ -63,10 +66,14 @@ export function traceView() {
     words.value = id;
     byId.checked = false;
     again();
-  });  const room = h("div", { class: "room" });
+  });
+  const room = h("div", { class: "room" });
   const list = h("div", { class: "trace-list", tabindex: "0", role: "log", "aria-label": "Frames", onscroll: draw, onclick: chooseLine, onkeydown: moveLine }, room);
   const listed = h("div", { class: "wide" }, headRow(), list);
-  const status = h("p", { class: "quiet", role: "status" });
+  const status = h("p", { class: "quiet", role: "status", id: "trace-status" });
+  const file = h("input", { id: "trace-file", type: "file", class: "unseen-input", accept: ".log,.txt,.asc,.blf,.trc,.pcap,.pcapng", onchange: load });
+  const live = h("button", { type: "button", id: "trace-live", class: "primary", hidden: true, onclick: () => show(null) }, "Back to the bus");
+  const saving = h("span", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), ...saves);
   const root = h(
     "section",
     { class: "trace" },
@@ -75,7 +82,7 @@ export function traceView() {
     listed,
     h("div", { class: "by-id", tabindex: "0", role: "region", "aria-label": "Frames by COB-ID" }, table.root),
     status,
-    h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), ...saves),
+    h("div", { class: "bar" }, saving, h("label", { class: "button", title: "A log of frames: candump, ASC, BLF, TRC, pcap, pcapng" }, "Load a log", file), live),
     sendWindow(),
   );
 
@@ -97,6 +104,42 @@ export function traceView() {
   let seen = linked.changes;
   /** Whether lines of another time than the newest are shown. */
   let elsewhere = false;
+  /** The log that is shown in place of the bus: `{ name, number, frames, oldest, remark, at_s }`; null for the bus. */
+  let log = null;
+
+  /** When the chosen line was: of the bus also where cursor A of the scope stands, whose times are not those of a log. */
+  const chosenAt = () => (log ? log.at_s : linked.at_s);
+  function chooseAt(at_s) {
+    if (log) log.at_s = at_s;
+    else linkTo(at_s);
+    seen = linked.changes;
+  }
+
+  async function load() {
+    const [one] = file.files;
+    file.value = "";
+    if (!one) return;
+    setText(status, `Loading ${one.name} …`);
+    try {
+      const answer = await request(`/api/trace/load?${new URLSearchParams({ name: one.name })}`, { method: "POST", body: one });
+      const body = await answer.json();
+      if (!answer.ok) throw new Error(body.error.message);
+      show({ ...body, name: one.name, at_s: null });
+    } catch (error) {
+      trouble = error.message;
+      draw();
+    }
+  }
+
+  /** Shows a log, from its first frame on, or the bus again. */
+  function show(next) {
+    log = next;
+    live.hidden = log === null;
+    saving.hidden = pause.hidden = log !== null;
+    // Whose readings the frames of a log are is not known.
+    quiet.disabled = log !== null;
+    again();
+  }
 
   function filter() {
     const chosen = [...kinds.children].filter((button) => button.getAttribute("aria-pressed") === "true").map((button) => button.dataset.kind);
@@ -115,7 +158,8 @@ export function traceView() {
   /** Starts again, with the newest lines of another filter. */
   function again() {
     generation += 1;
-    [lines, from, to, skipped, follows, elsewhere] = [[], null, null, 0, true, false];
+    [lines, from, to, skipped, follows, elsewhere, oldest, next] = [[], null, null, 0, log === null, false, log?.oldest ?? 0, log?.frames ?? 0];
+    trouble = null;
     for (const save of saves) save.href = `/api/trace.${save.dataset.form}?${filter()}`;
     table.clear();
     listed.hidden = byId.checked;
@@ -127,12 +171,13 @@ export function traceView() {
   }
 
   /** Asks the studio; null where the answer does not count any more, or there is none. */
-  async function part(more, path = "/api/trace") {
+  async function part(more, what = "") {
+    const path = log ? `/api/trace/loaded/${log.number}${what}` : `/api/trace${what}`;
     const asked = filter();
-    asked.set("count", String(PART));
+    asked.set("count", String(log ? WINDOW : PART));
     if (words.value.trim()) asked.set("text", words.value);
     if (whole.checked) asked.set("transfers", "true");
-    if (quiet.checked) asked.set("quiet", "true");
+    if (quiet.checked && !log) asked.set("quiet", "true");
     for (const [name, value] of Object.entries(more)) asked.set(name, String(value));
     const mine = generation;
     fetching = true;
@@ -151,7 +196,14 @@ export function traceView() {
     return body;
   }
 
-  const wantsNew = () => to === null || (!paused && (follows || lines.length < MOST_LINES));
+  const wantsNew = () => to === null || (log ? to < next && lines.length < MOST_LINES : !paused && (follows || lines.length < MOST_LINES));
+
+  /** Which frames are asked for: of a log those that come next, of the bus the newest. */
+  function wanted(window) {
+    if (!log) return to === null ? {} : { after: to };
+    const after = to ?? oldest;
+    return { after, before: after + window };
+  }
 
   async function ask() {
     clearTimeout(timer);
@@ -160,7 +212,7 @@ export function traceView() {
     if (byId.checked) return askIdentifiers(mine);
     // The first lines of a filter are shown even while paused; a hidden tab requests nothing.
     if (wantsNew() && !document.hidden && !fetching) {
-      const body = await part(to === null ? {} : { after: to });
+      const body = await part(wanted(WINDOW));
       if (body) {
         if (to === null) from = body.from;
         skipped += body.skipped;
@@ -180,8 +232,8 @@ export function traceView() {
   }
 
   async function askIdentifiers(mine) {
-    if (!document.hidden && !fetching && (!paused || to === null)) {
-      const body = await part(to === null ? {} : { after: to }, "/api/trace/identifiers");
+    if (!document.hidden && !fetching && (log ? to === null || to < next : !paused || to === null)) {
+      const body = await part(wanted(WINDOW_IDENTIFIERS), "/identifiers");
       if (body) {
         to = body.to;
         skipped += body.skipped;
@@ -227,19 +279,17 @@ export function traceView() {
     const row = event.target.closest(".trace-row");
     const line = row && lines.find(({ number: of }) => String(of) === row.dataset.number);
     if (!line) return;
-    linkTo(line.at_s);
-    seen = linked.changes;
+    chooseAt(line.at_s);
     draw();
   }
 
   function moveLine(event) {
     const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-    if (by === undefined || event.altKey || event.ctrlKey || event.metaKey || linked.at_s === null) return;
-    const at = Math.min(lines.length - 1, Math.max(0, lineAt(lines, linked.at_s) + by));
+    if (by === undefined || event.altKey || event.ctrlKey || event.metaKey || chosenAt() === null) return;
+    const at = Math.min(lines.length - 1, Math.max(0, lineAt(lines, chosenAt()) + by));
     if (!lines[at]) return;
     follows = false;
-    linkTo(lines[at].at_s);
-    seen = linked.changes;
+    chooseAt(lines[at].at_s);
     const top = at * ROW_PX;
     if (top < list.scrollTop || top + 2 * ROW_PX > list.scrollTop + list.clientHeight) showLine(at);
     else draw();
@@ -261,6 +311,7 @@ export function traceView() {
   }
 
   function pauseOrGoOn() {
+    if (log) return;
     paused = !paused;
     pause.setAttribute("aria-pressed", String(paused));
     setText(pause, paused ? "Resume" : "Pause");
@@ -270,7 +321,7 @@ export function traceView() {
   }
 
   const row = (line, at, chosen) => {
-    const element = lineRow(line, timeOf(lines, at, delta.value, linked.at_s));
+    const element = lineRow(line, timeOf(lines, at, delta.value, chosenAt()));
     element.classList.toggle("chosen-line", at === chosen);
     element.style.top = `${at * ROW_PX}px`;
     return element;
@@ -278,22 +329,23 @@ export function traceView() {
 
   /** Draws only the lines in view. */
   function draw(event) {
-    if (event) follows = list.scrollTop + list.clientHeight >= list.scrollHeight - ROW_PX;
+    if (event) follows = log === null && list.scrollTop + list.clientHeight >= list.scrollHeight - ROW_PX;
     room.style.height = `${lines.length * ROW_PX}px`;
     if (follows && !event) list.scrollTop = list.scrollHeight;
     const first = Math.max(0, Math.floor(list.scrollTop / ROW_PX) - 2);
     const last = Math.min(lines.length, first + Math.ceil(list.clientHeight / ROW_PX) + 4);
-    const chosen = linked.at_s === null ? -1 : lineAt(lines, linked.at_s);
+    const chosen = chosenAt() === null ? -1 : lineAt(lines, chosenAt());
     room.replaceChildren(...lines.slice(first, last).map((line, at) => row(line, first + at, chosen)));
-    toCursor.hidden = linked.at_s === null;
+    toCursor.hidden = log !== null || linked.at_s === null;
     if (event && list.scrollTop < ROW_PX) askOlder();
     // With a filter that few lines pass, the lines that fill the view are further back.
     else if (lines.length * ROW_PX < list.clientHeight) askOlder();
     const missed = skipped ? ` ${skipped} frames are not shown: too many for this page.` : "";
     const kept = next - oldest;
     const searched = from === null ? 0 : next - from;
+    const ofLog = log && `${lines.length} ${lines.length === 1 ? "line" : "lines"} of ${log.name}: ${searched === 0 ? 0 : to - oldest} of ${log.frames} frames read${oldest ? `, the first ${oldest} are not kept` : ""}${log.remark ? `; ${log.remark}` : ""}. Times are from its first frame on.`;
     const byIdentifier = `${table.size()} COB-IDs${quiet.checked ? ", without the studio's readings" : ""}.${missed}${paused ? " Paused." : ""}`;
-    setText(status, trouble ?? (byId.checked ? byIdentifier : `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio keeps recording." : ""}`));
+    setText(status, trouble ?? (byId.checked ? byIdentifier : ofLog ?? `${lines.length} ${lines.length === 1 ? "line" : "lines"} of the last ${searched} frames; the studio keeps ${kept}.${missed}${paused ? " Paused: the studio keeps recording." : ""}`));
     status.classList.toggle("bad", trouble !== null);
   }
 
@@ -306,7 +358,7 @@ export function traceView() {
     shown = true;
     seen = linked.changes;
     // After a pause only the newest frames are fetched, not each one since.
-    if (paused) ask();
+    if (paused || log) ask();
     else again();
   }
 

@@ -98,6 +98,23 @@ impl Trace {
         decoder
     }
 
+    /// A trace of the frames of a log of another time, decoded by the models of this bus's nodes. A frame whose time is before that of
+    /// the one before it has the time of that.
+    pub fn of_log(&self, frames: impl IntoIterator<Item = (Instant, Frame)>) -> Self {
+        let (known, models) = {
+            let ring = self.lock();
+            (ring.known.clone(), ring.models.clone())
+        };
+        let trace = Self::new(known, Origin::default());
+        models.into_iter().for_each(|(node, model)| trace.set_model(node, model));
+        let mut newest = Instant::ZERO;
+        for (at, frame) in frames {
+            newest = newest.max(at);
+            trace.append(BusFrame { at: newest, frame, own: false });
+        }
+        trace
+    }
+
     /// What a frame would mean after those that have passed.
     pub(crate) fn meaning(&self, frame: &Frame) -> Decoded {
         let mut decoder = self.lock().decoder.clone();

@@ -6,6 +6,8 @@ mod answer;
 mod bundle;
 mod door;
 mod guessers;
+mod loaded;
+mod log_file;
 mod openapi;
 mod page;
 mod parameters;
@@ -69,12 +71,21 @@ struct Web {
     doors: trace::Doors,
     /// One record or file at a time, to bound memory.
     records: Arc<Semaphore>,
+    /// The log that a page has loaded.
+    logs: loaded::Logs,
 }
 
 /// The server of a studio as one router, which can be called without a socket.
 pub fn app(handle: HostHandle, access: Arc<Access>) -> Router {
     let one = || Arc::new(Semaphore::new(1));
-    let web = Web { handle, access, guessers: Arc::default(), doors: trace::Doors::default(), records: one() };
+    let web = Web {
+        handle,
+        access,
+        guessers: Arc::default(),
+        doors: trace::Doors::default(),
+        records: one(),
+        logs: loaded::Logs::default(),
+    };
     let api = ROUTES.iter().fold(Router::new(), |router, route| router.route(route.path, handler(route.operation)));
     api.route("/", get(async |asked: HeaderMap| page::file("index.html", &asked)))
         .route("/page/{file}", get(async |Path(file): Path<String>, asked: HeaderMap| page::file(&file, &asked)))
@@ -95,6 +106,16 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
         Operation::Socket => get(socket),
         Operation::Faults => get(faults),
         Operation::Trace => get(async |State(web): State<Web>, asked| trace::lines(web.handle, web.doors, asked).await),
+        Operation::TraceLoad => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
+            loaded::load(web.handle, web.records, web.logs, asked, body).await
+        })
+        .layer(DefaultBodyLimit::max(recording::LARGEST)),
+        Operation::Loaded => get(async |State(web): State<Web>, Path(number), asked| {
+            trace::loaded_lines(web.logs.held(number), web.doors, asked).await
+        }),
+        Operation::LoadedIdentifiers => get(async |State(web): State<Web>, Path(number), asked| {
+            trace::loaded_identifiers(web.logs.held(number), web.doors, asked).await
+        }),
         Operation::Series => {
             get(async |State(web): State<Web>, asked| trace::series(web.handle, web.doors, asked).await)
         }

@@ -19,6 +19,9 @@ pub(super) enum Operation {
     TraceBlf,
     TracePcapng,
     Identifiers,
+    TraceLoad,
+    Loaded,
+    LoadedIdentifiers,
     RecordingMcap,
     Recording,
     ParametersToml,
@@ -39,12 +42,14 @@ const MALFORMED: (&str, &str) = ("400", "A parameter is not valid");
 const OVER: (&str, &str) = ("503", "The studio is ending");
 const FOREIGN: (&str, &str) = ("403", "The Origin or the Host is not that of this server");
 
+const REPLACED: (&str, &str) = ("404", "Another log was loaded since");
+
 /// The answers to a request for a log in a form that is made as a whole.
 const SAVED: &[(&str, &str)] =
     &[("200", "The frames of the chosen nodes and kinds"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER];
 
 /// All requests. No GET changes anything, and no request moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 17] = [
+pub(super) const ROUTES: [Route; 20] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -160,6 +165,41 @@ pub(super) const ROUTES: [Route; 17] = [
         ],
     },
     Route {
+        path: "/api/trace/load",
+        method: "post",
+        operation: Operation::TraceLoad,
+        summary: "Load a log of frames, the body, in any form that ferrodrive reads; the newest one is kept",
+        answers: &[
+            ("200", "Its number, its frames, the number of the first one that is kept, and what was not read"),
+            ("400", "The body is not such a log"),
+            LET_IN,
+            FOREIGN,
+            ("413", "More than 32 MB"),
+            ("429", "Another file is being read"),
+            OVER,
+        ],
+    },
+    Route {
+        path: "/api/trace/loaded/{log}",
+        method: "get",
+        operation: Operation::Loaded,
+        summary: "Frames of a loaded log, as those of /api/trace; times are from its first frame on",
+        answers: &[
+            ("200", "Lines, oldest first, and the range of frames that they cover"),
+            MALFORMED,
+            LET_IN,
+            REPLACED,
+            OVER,
+        ],
+    },
+    Route {
+        path: "/api/trace/loaded/{log}/identifiers",
+        method: "get",
+        operation: Operation::LoadedIdentifiers,
+        summary: "Frames of a loaded log by identifier, as those of /api/trace/identifiers",
+        answers: &[("200", "A row for each identifier"), MALFORMED, LET_IN, REPLACED, OVER],
+    },
+    Route {
         path: "/api/recording.mcap",
         method: "post",
         operation: Operation::RecordingMcap,
@@ -214,7 +254,9 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
         | Operation::TraceAsc
         | Operation::TraceBlf
         | Operation::TracePcapng
-        | Operation::Identifiers => &[
+        | Operation::Identifiers
+        | Operation::Loaded
+        | Operation::LoadedIdentifiers => &[
             ("after", "integer", "Only frames from this number on"),
             ("before", "integer", "Only frames below this number"),
             ("from_s", "number", "Only frames from this time of the bus on"),
@@ -238,7 +280,9 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
             ),
             ("after", "integer", "Only frames from this number on"),
         ],
-        Operation::Recording => &[("name", "string", "Name of the file: its ending shows what it is")],
+        Operation::Recording | Operation::TraceLoad => {
+            &[("name", "string", "Name of the file: its ending shows what it is")]
+        }
         Operation::ParametersToml => &[("node", "integer", "The node-ID to use if the file has none, 1 to 127")],
         Operation::Faults => &[("since", "integer", "The revision of the last answer; 0 for everything")],
         _ => &[],
@@ -252,10 +296,15 @@ pub(super) fn document() -> Value {
         let answers: Map<String, Value> =
             route.answers.iter().map(|(status, text)| ((*status).to_owned(), json!({ "description": text }))).collect();
         let parameter = |(name, kind, text): &(&str, &str, &str)| json!({ "name": name, "in": "query", "description": text, "schema": { "type": kind } });
+        let of_path = route.path.contains("{log}").then(|| {
+            let text = "Number of the log, as /api/trace/load has answered";
+            json!({ "name": "log", "in": "path", "required": true, "description": text, "schema": { "type": "integer" } })
+        });
+        let of_query = parameters(route.operation).iter().map(parameter);
         let operation = json!({
             "operationId": format!("{:?}", route.operation),
             "summary": route.summary,
-            "parameters": parameters(route.operation).iter().map(parameter).collect::<Vec<_>>(),
+            "parameters": of_path.into_iter().chain(of_query).collect::<Vec<_>>(),
             "responses": answers,
         });
         let path = paths.entry(route.path).or_insert_with(|| json!({}));

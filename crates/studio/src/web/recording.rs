@@ -1,6 +1,5 @@
 //! Files of values: those that a page keeps, as a record; a record or a log that it loads, as values.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use axum::body::Bytes;
@@ -10,13 +9,13 @@ use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use can::Instant;
-use canlog::{Content, Entry, Format, LogReader, Record};
 use host::HostHandle;
 use recording::{Kind, Recorded, mcap_of_csv, read};
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 
 use super::answer::{json_text, trouble};
+use super::log_file::{LogFile, format_of};
 
 /// The largest accepted record in bytes: a minute of twelve objects at 1 kHz has about half of it.
 pub(super) const LARGEST: usize = 32 << 20;
@@ -42,7 +41,7 @@ pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Named {
-    name: String,
+    pub(super) name: String,
 }
 
 /// The contents of a file.
@@ -101,11 +100,10 @@ fn of_file(handle: &HostHandle, name: &str, bytes: &[u8]) -> Result<Values, Stri
     if let Some(kind) = Kind::of_name(name) {
         return read(kind, bytes).map(of_record).map_err(|why| format!("{name}: {why}"));
     }
-    let format = Format::of_content(bytes.get(..bytes.len().min(512)).unwrap_or_default());
-    let format = format.or_else(|| Format::of_name(Path::new(name))).ok_or_else(|| {
+    let format = format_of(name, bytes).ok_or_else(|| {
         format!("{name}: expected a record (.mcap, .csv) or a log of frames (candump, ASC, BLF, TRC, pcap, pcapng)")
     })?;
-    of_log(handle, LogReader::new(bytes, format)).map_err(|why| format!("{name}: {why}"))
+    of_log(handle, LogFile::new(bytes, format)).map_err(|why| format!("{name}: {why}"))
 }
 
 fn of_record(recorded: Recorded) -> Values {
@@ -128,29 +126,8 @@ fn of_record(recorded: Recorded) -> Values {
     }
 }
 
-/// A log, with times from its first frame on.
-fn of_log(handle: &HostHandle, log: LogReader<&[u8]>) -> Result<Values, String> {
-    let (mut passed_over, mut without_time, mut failed) = (0_usize, 0_usize, None);
-    let mut first = None;
-    let frames =
-        log.map_while(|entry| entry.map_err(|error| failed = Some(error.to_string())).ok()).filter_map(|entry| {
-            match entry {
-                Entry::Record(Record { at: Some(at), content: Content::Frame(frame), .. }) => {
-                    let first = *first.get_or_insert(at);
-                    Some((Instant::from_nanos(at.nanos_since(first)), frame))
-                }
-                Entry::Record(Record { at: None, .. }) => {
-                    without_time += 1;
-                    None
-                }
-                Entry::Record(_) => None,
-                Entry::Finding(_) => {
-                    passed_over += 1;
-                    None
-                }
-            }
-        });
-    let series = handle.trace().values_of_log(frames)?;
+fn of_log(handle: &HostHandle, mut log: LogFile<'_>) -> Result<Values, String> {
+    let series = handle.trace().values_of_log(&mut log)?;
     let columns = series.into_iter().map(|one| {
         let mut place = one.object.splitn(2, ':');
         let (node, object) = (place.next().unwrap_or_default(), place.next().unwrap_or_default());
@@ -161,20 +138,12 @@ fn of_log(handle: &HostHandle, log: LogReader<&[u8]>) -> Result<Values, String> 
             points: one.points.into_iter().map(|(at_s, value)| (at_s, value as f64)).collect(),
         }
     });
-    let parts = [
-        (passed_over > 0).then(|| format!("{passed_over} lines or parts are not frames and were passed over")),
-        (without_time > 0).then(|| format!("{without_time} frames have no time")),
-        failed,
-    ];
-    Ok(Values {
-        columns: columns.collect(),
-        marks: Vec::new(),
-        remark: parts.into_iter().flatten().collect::<Vec<_>>().join("; "),
-    })
+    Ok(Values { columns: columns.collect(), marks: Vec::new(), remark: log.remark() })
 }
 
 #[cfg(test)]
 mod tests {
+    use canlog::{Entry, Format, LogReader};
     use host::session::channel;
     use host::trace::{Origin, Trace};
 
@@ -195,6 +164,9 @@ mod tests {
         assert_eq!(values["columns"], serde_json::json!([column]));
         assert_eq!(values["marks"], serde_json::json!([{ "time_s": 1.0, "node": null, "text": "over-voltage" }]));
         assert_eq!(values["remark"], "");
+        let mcap = mcap_of_csv(b"t_s,4.velocity_rpm,mark\n0.5,60,\n1,,over-voltage\n1.5,61,\n").expect("it is written");
+        let of_mcap = loaded("a.mcap", &mcap).expect("a record");
+        assert_eq!((&of_mcap["columns"], &of_mcap["marks"]), (&values["columns"], &values["marks"]));
     }
 
     /// CiA 301, 7.2.4.3: an expedited upload of 4 bytes is answered by 43h.

@@ -1,5 +1,7 @@
 //! Who may connect, and what a socket withstands. The test takes the place of the host.
 
+mod loaded;
+
 use std::sync::Arc;
 use std::time::Duration;
 

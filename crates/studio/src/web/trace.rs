@@ -15,6 +15,7 @@ use futures_util::stream;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::answer::{json_text, trouble};
+use super::loaded::replaced;
 use canlog::{Direction, Format, Interface, LogWriter, Record};
 use host::HostHandle;
 use host::trace::{Asked, AskedSeries, Held, Origin, Query};
@@ -55,14 +56,48 @@ pub(super) async fn identifiers(handle: HostHandle, doors: Doors, asked: InQuery
     decoded(handle, doors, asked, |query, held| serde_json::to_string(&query.identifiers(held))).await
 }
 
+/// Lines of a log that was loaded, `None` where it is not kept any more.
+pub(super) async fn loaded_lines(log: Option<Held>, doors: Doors, asked: InQuery) -> Response {
+    match log {
+        Some(log) => decoded(log, doors, asked, |query, held| serde_json::to_string(&query.select(held))).await,
+        None => replaced(),
+    }
+}
+
+/// The same by identifier.
+pub(super) async fn loaded_identifiers(log: Option<Held>, doors: Doors, asked: InQuery) -> Response {
+    match log {
+        Some(log) => decoded(log, doors, asked, |query, held| serde_json::to_string(&query.identifiers(held))).await,
+        None => replaced(),
+    }
+}
+
+/// The frames that a reader asks about.
+trait Frames: Send + 'static {
+    fn frames(self) -> Held;
+}
+
+/// Those of the bus at the time when it is the reader's turn.
+impl Frames for HostHandle {
+    fn frames(self) -> Held {
+        self.trace().held()
+    }
+}
+
+impl Frames for Held {
+    fn frames(self) -> Held {
+        self
+    }
+}
+
 async fn decoded(
-    handle: HostHandle,
+    of: impl Frames,
     doors: Doors,
     asked: InQuery,
     work: impl FnOnce(&Query, &Held) -> serde_json::Result<String> + Send + 'static,
 ) -> Response {
     match understand(asked) {
-        Ok(query) => held(handle, doors, move |held| work(&query, held)).await,
+        Ok(query) => held(of, doors, move |held| work(&query, held)).await,
         Err(refusal) => *refusal,
     }
 }
@@ -83,12 +118,12 @@ pub(super) async fn series(
 /// What is made of the frames that are held, when it is this reader's turn. The turn ends with the work, which goes on if the reader
 /// goes away.
 async fn held(
-    handle: HostHandle,
+    of: impl Frames,
     doors: Doors,
     work: impl FnOnce(&Held) -> serde_json::Result<String> + Send + 'static,
 ) -> Response {
     let Ok(turn) = doors.decoding.acquire_owned().await else { return over() };
-    let held = handle.trace().held();
+    let held = of.frames();
     let work = move || {
         let _turn = turn;
         work(&held)
