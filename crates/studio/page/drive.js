@@ -1,7 +1,9 @@
 // The Drive view: what one drive reports, and why it does not move yet.
 
 import { ask } from "./link.js";
-import { hasFault, isSilent } from "./bus_rows.js";
+import { chosenNodes, hasFault, isSilent } from "./bus_rows.js";
+import { choice } from "./choice.js";
+import { chooseUnit, shownIn } from "./chosen_units.js";
 import { h, hex, number, renew, setText } from "./dom.js";
 import { term, terms } from "./help.js";
 import { powerMachine } from "./machine.js";
@@ -9,6 +11,7 @@ import { request } from "./transport.js";
 import { buttonsOf } from "./remedy.js";
 import { remedyBar } from "./remedy_bar.js";
 import { reportBar } from "./report.js";
+import { unitsOf } from "./unit_table.js";
 
 /** Label, field, decimals, unit. */
 export const VALUES = [
@@ -21,39 +24,68 @@ export const VALUES = [
   ["Power stage", "driver_celsius", 0, "°C"],
 ];
 
-/** Buttons that choose a drive. */
+/** More drives than this are a list with a filter. */
+const FEW = 8;
+let choosers = 0;
+
+/** Buttons that choose a drive; a list where there are many. */
 export function chooser(shared) {
-  const root = h("div", { class: "chooser", role: "group", "aria-label": "Drive" });
+  const buttons = h("div", { class: "chooser", role: "group", "aria-label": "Drive" });
+  const list = choice(`drive-list-${(choosers += 1)}`, "Drive", [], { onchange: () => (shared.node = Number(list.value)) });
+  const words = h("input", { type: "search", size: "12", placeholder: "filter drives", "aria-label": "Words that a drive of the list must have" });
+  const many = h("span", { class: "bar many-drives", hidden: true }, list, words);
+  const root = h("div", {}, buttons, many);
+  const isBad = (node) => hasFault(node) || isSilent(node);
+  const text = (node) => `${isBad(node) ? "⚠ " : ""}${node.node} ${node.model ?? ""}`;
+
+  function updateList(drives) {
+    const found = chosenNodes(drives, { words: words.value }).map(({ node }) => node);
+    // The chosen one stays in the list: to filter chooses nothing.
+    const some = drives.filter(({ node }) => node === shared.node || found.includes(node));
+    const key = some.map(text).join("\n");
+    if (many.dataset.key !== key) list.offer(some.map((node) => ({ value: String(node.node), text: text(node) })));
+    many.dataset.key = key;
+    if (list.value !== String(shared.node)) list.value = String(shared.node);
+  }
+
   const update = (state) => {
     const drives = state.nodes.filter((node) => node.drive || node.trouble);
-    const isBad = (node) => hasFault(node) || isSilent(node);
-    const key = `${shared.node} ${drives.map((node) => `${node.node}${node.model}${isBad(node)}`).join()}`;
-    renew(root, key, () =>
+    buttons.hidden = drives.length > FEW;
+    many.hidden = !buttons.hidden;
+    if (buttons.hidden) return updateList(drives);
+    renew(buttons, `${shared.node} ${drives.map(text).join()}`, () =>
       drives.map((node) =>
-        h("button", { type: "button", "aria-pressed": String(node.node === shared.node), class: isBad(node) ? "bad" : "", title: isBad(node) ? "A fault, or no answer" : "", onclick: () => (shared.node = node.node) }, `${isBad(node) ? "⚠ " : ""}${node.node} ${node.model ?? ""}`)));
+        h("button", { type: "button", "aria-pressed": String(node.node === shared.node), class: isBad(node) ? "bad" : "", title: isBad(node) ? "A fault, or no answer" : "", onclick: () => (shared.node = node.node) }, text(node))));
   };
   return { root, update };
 }
 
-/** Large numbers. */
-export function tiles(values) {
+/** Large numbers, each in a unit that can be chosen; `view` names them. */
+export function tiles(values, view) {
   const of = values.map(([label, field, decimals, unit]) => {
     const value = h("b");
-    return { field, decimals, value, tile: h("div", { class: "tile" }, h("span", {}, label), h("div", {}, value, ` ${unit}`)) };
+    const units = unitsOf(unit).length > 1 ? choice(`${view}-unit-${field}`, `Unit of ${label.toLowerCase()}`, [], { onchange: () => chooseUnit(field, units.value) }) : null;
+    return { field, decimals, unit, value, units, tile: h("div", { class: "tile" }, h("span", {}, label), h("div", {}, value, " ", units ?? unit)) };
   });
   const root = h("div", { class: "tiles" }, ...of.map(({ tile }) => tile));
-  const update = (drive) =>
-    of.forEach(({ field, decimals, value, tile }) => {
+  const update = (drive, feed_m = null) =>
+    of.forEach(({ field, decimals, unit, value, units, tile }) => {
       const known = drive?.[field] ?? null;
       tile.hidden = drive !== null && known === null;
-      setText(value, number(known, decimals));
+      const as = shownIn({ field, unit, decimals }, feed_m);
+      setText(value, number(known === null ? null : known * as.factor, as.decimals));
+      if (!units) return;
+      const offered = unitsOf(unit, [feed_m]);
+      if (units.dataset.key !== offered.join()) units.offer(offered.map((one) => ({ value: one, text: one })));
+      units.dataset.key = offered.join();
+      if (units.value !== as.unit) units.value = as.unit;
     });
   return { root, update };
 }
 
 export function driveView(shared, report) {
   const choose = chooser(shared);
-  const large = tiles(VALUES);
+  const large = tiles(VALUES, "drive");
   const title = h("h2");
   const remark = h("p", { class: "quiet" });
   const trouble = h("p", { class: "bad", role: "status" });
@@ -117,7 +149,7 @@ export function driveView(shared, report) {
     setText(title, node ? `Node ${node.node}: ${node.title ?? "unknown model"}` : "No drive");
     setText(remark, node?.remark ?? "");
     setText(trouble, node?.trouble ?? (node && !drive ? "Not a drive, or not read yet." : ""));
-    large.update(drive);
+    large.update(drive, node?.feed_m ?? null);
     machine?.update(drive?.state ?? null, drive?.way ?? []);
     const steps = drive?.way.map((step) => `${hex(step.controlword, 2)} → ${step.to}`).join(", then ");
     const without = drive && !drive.has_state_machine ? " This model has no power state machine: its statusword echoes the controlword, and the state shown is the closest one." : "";

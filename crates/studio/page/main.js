@@ -5,8 +5,6 @@ import { closeChoice } from "./choice.js";
 import { h, number, renew, setText, toggle } from "./dom.js";
 import { busView } from "./bus.js";
 import { concerns } from "./bus_rows.js";
-import { driveView } from "./drive.js";
-import { motionView } from "./motion.js";
 import { helpPanel } from "./help.js";
 import { meaningOf } from "./keys.js";
 import { lostSight, unseenStops } from "./sight.js";
@@ -38,8 +36,8 @@ const fetching = () => ({ root: h("p", { class: "quiet", role: "status" }, "Load
 
 const views = [
   { name: "bus", title: "Bus", view: busView(shared, () => show("drive")) },
-  { name: "drive", title: "Drive", view: driveView(shared, report) },
-  { name: "motion", title: "Motion", view: motionView(shared, report) },
+  { name: "drive", title: "Drive", view: fetching() },
+  { name: "motion", title: "Motion", view: fetching() },
   { name: "scope", title: "Scope", view: fetching() },
   { name: "parameters", title: "Parameters", view: fetching() },
   { name: "pdo", title: "PDO", view: fetching() },
@@ -49,9 +47,14 @@ const views = [
   { name: "console", title: "Console", view: fetching() },
 ];
 let shown = null;
+let isFetching = false;
 
-/** Fetches the other views, again and again while the line is down. */
+/**
+ * Fetches the other views, again and again while the line is down. On a slow line they would delay the first state of the drives, so that
+ * they come after it, or when one of them is to be shown.
+ */
 async function fetchViews() {
+  isFetching = true;
   try {
     const { laterViews } = await import("./views.js");
     for (const [name, view] of Object.entries(laterViews(shared, report))) views.find((one) => one.name === name).view = view;
@@ -72,6 +75,7 @@ function show(name) {
   if (next === shown) return;
   shown?.view.hide?.();
   shown = next;
+  if (next !== views[0] && !isFetching) fetchViews();
   byId("view").replaceChildren(next.view.root);
   scrollTo(0, 0);
   for (const tab of byId("tabs").children) {
@@ -218,6 +222,10 @@ on("state", (state) => {
   }
   shown?.view.update(state);
   tour.update(state);
+  if (isFetching) return;
+  isFetching = true;
+  // Behind this one in the browser too.
+  setTimeout(fetchViews);
 });
 
 /** Whether a text concerns no node, or begins with the name of its node. */
@@ -262,4 +270,3 @@ on("stop", ({ confirmed, after_ms }) => {
 
 show(location.hash.slice(1) || "bus");
 connect();
-fetchViews();

@@ -1,7 +1,7 @@
 // The Motion view: everything that moves a drive. A jog lasts as long as its button is held.
 
 import { ask, inControl, link } from "./link.js";
-import { h, setText, toggle } from "./dom.js";
+import { h, renew, setText, toggle } from "./dom.js";
 import { VALUES, chooser, tiles } from "./drive.js";
 import { groupMotion } from "./group.js";
 import { guarding } from "./guarding.js";
@@ -12,6 +12,7 @@ import { HOLD_MS, heldButtons, motionForm } from "./motion_form.js";
 import { sequencePanel } from "./sequence_panel.js";
 import { isSeenMoving } from "./sight.js";
 import { host_name } from "./transport.js";
+import { unitField } from "./unit_field.js";
 
 /** Hold to run: turns while held, stops when released in any way. */
 function jogger(shared, speed, report, isAccepted) {
@@ -53,17 +54,16 @@ function jogger(shared, speed, report, isAccepted) {
 
 export function motionView(shared, report) {
   const choose = chooser(shared);
-  const large = tiles(VALUES.slice(0, 4));
+  const large = tiles(VALUES.slice(0, 4), "motion");
   const title = h("h2");
   const status = h("p", { class: "status", role: "status" });
 
-  const field = (id, label, unit, value, optional = false) => {
-    const input = h("input", { id, type: "number", step: "any", value, placeholder: optional ? "as set" : "", inputmode: "decimal" });
-    return { input, row: h("label", { for: id }, `${label} `, input, ` ${unit}`) };
-  };
-  const read = ({ input }) => (input.value.trim() === "" ? null : Number(input.value));
+  const ANGLE = { field: "angle_degrees", unit: "°" };
+  const SPEED = { field: "velocity_rpm", unit: "r/min" };
+  const CURRENT = { field: "current_a", unit: "A" };
+  const read = (of) => of.read();
   const required = (of) => {
-    const value = read(of);
+    const value = of.read();
     if (value === null || !Number.isFinite(value)) {
       of.input.focus();
       return null;
@@ -86,20 +86,37 @@ export function motionView(shared, report) {
     return motionForm(name, go, ...fields);
   };
 
-  const jogSpeed = field("jog-speed", "Speed", "r/min", "60");
+  const jogSpeed = unitField("jog-speed", "Speed", SPEED, "60");
   const risk = guarding("guarding", report);
   const jog = jogger(shared, () => Math.abs(required(jogSpeed) ?? 0), report, risk.isAccepted);
-  const speed = field("velocity-rpm", "Speed", "r/min", "60");
-  const ramp = field("velocity-ramp", "Ramp", "r/min/s", "", true);
-  const angle = field("move-degrees", "Angle", "°", "90");
-  const moveSpeed = field("move-rpm", "at", "r/min", "", true);
+  const speed = unitField("velocity-rpm", "Speed", SPEED, "60");
+  const ramp = unitField("velocity-ramp", "Ramp", SPEED, "", { optional: true, rate: true });
+  const angle = unitField("move-degrees", "Distance", ANGLE, "90");
+  const moveSpeed = unitField("move-rpm", "at", SPEED, "", { optional: true });
   const relative = toggle("move-relative", "relative, from the last target", true);
-  const amperes = field("torque-amperes", "Current", "A", "0.5");
+  const amperes = unitField("torque-amperes", "Current", CURRENT, "0.5");
+  const fields = [jogSpeed, speed, ramp, angle, moveSpeed, amperes];
   const homing = homingWizard(shared, report, risk.isAccepted);
   const group = groupMotion(report);
 
   const power = (id, name, what, key) =>
     h("button", { type: "button", id, title: key ? `${name} (key ${key})` : name, onclick: () => send(name, { do: what, node: shared.node }) }, name);
+
+  /** Why nothing can be commanded here, with the button for it. */
+  const why = h("div", { class: "bar", id: "motion-why", role: "status" });
+  function tellWhy(state, node) {
+    const [mine, other] = [inControl(), state.controller];
+    const what = !node?.drive ? "nothing" : mine ? "" : other === null ? "free" : state.asking === link.welcome?.session ? "asked" : "other";
+    const button = (id, text, command) => h("button", { type: "button", id, class: "primary", onclick: async () => report("Control", await ask({ do: command })) }, text);
+    why.hidden = what === "";
+    renew(why, `${what} ${other}`, () => ({
+      "": [],
+      nothing: ["Nothing can be commanded here: no drive is chosen, or it has not answered yet."],
+      free: ["Nothing can be commanded here until this page has control of the drives.", button("motion-take", "Take control", "take_control")],
+      other: [`Session ${other} has control of the drives: nothing can be commanded here until it hands over.`, button("motion-ask", "Ask for control", "ask_control")],
+      asked: [`Session ${other} was asked for control of the drives.`],
+    })[what]);
+  }
 
   const enables = h("p", { class: "quiet" }, "Holding a button also enables the drive.");
   /** Shaft position of a node one second before its last reading. */
@@ -155,13 +172,14 @@ export function motionView(shared, report) {
     homing.root,
     group.root,
   );
-  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, risk.root, speedLimit(report), controls, sequencePanel(areAccepted));
+  const root = h("section", { class: "motion" }, h("div", { class: "bar" }, title, choose.root), large.root, status, why, risk.root, speedLimit(report), controls, sequencePanel(areAccepted));
 
   function update(state) {
     choose.update(state);
     const node = state.nodes.find((node) => node.node === shared.node);
     setText(title, node ? `Node ${node.node}: ${node.title ?? "unknown model"}` : "No drive");
-    large.update(node?.drive ?? null);
+    large.update(node?.drive ?? null, node?.feed_m ?? null);
+    for (const one of fields) one.update(node?.feed_m ?? null);
     const seen = node && isSeenMoving(node.drive, before_degrees(node.node));
     const parts = [node?.trouble ?? node?.drive?.state ?? "–", node?.doing, seen ? (node.moving ? "in motion by this studio" : "in motion") : null];
     setText(status, parts.filter(Boolean).join(" · "));
@@ -172,7 +190,7 @@ export function motionView(shared, report) {
     homing.update(state);
     group.update(state);
     controls.disabled = !inControl() || !node?.drive;
-    controls.title = inControl() ? "" : "Take control first";
+    tellWhy(state, node);
   }
 
   function hide() {

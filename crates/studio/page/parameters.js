@@ -154,21 +154,24 @@ export function parametersView(shared, report) {
     for (const row of rows) {
       shownRows.push(row);
       body.append(line(row));
-      if (chosen === row.object) body.append(h("tr", { class: "chosen" }, h("td", { colspan: 6 }, detail(row))));
+      if (chosen === row.object) body.append(h("tr", { class: "chosen" }, h("td", { colspan: 7 }, detail(row))));
     }
-    const heads = ["Object", "Name", "Value", "Default", "Range", "Access"];
+    const heads = ["Object", "Name", "Value", "One count", "Default", "Range", "Access"];
     return h("table", {}, h("thead", {}, h("tr", {}, ...heads.map((head) => h("th", {}, head)))), body);
   }
 
   function line(row) {
-    const value = h("td", { "data-label": "Value" });
+    const value = h("span");
+    // A parameter is changed in its row.
+    const edits = row.parameter && chosen === row.object ? form(row) : null;
     const range = row.range ? `${row.range}${row.range_times ? ` × ${row.range_times}` : ""}` : "";
     const of = h(
       "tr",
-      { tabindex: "0", "data-object": row.object, onclick: () => choose_row(row), onkeydown: (event) => event.key === "Enter" && choose_row(row) },
+      { tabindex: "0", "data-object": row.object, onclick: (event) => event.target.closest("form") || choose_row(row), onkeydown: (event) => event.key === "Enter" && event.target === of && choose_row(row) },
       h("td", { "data-label": "Object" }, row.object),
       h("td", { "data-label": "Name" }, row.name),
-      value,
+      h("td", { "data-label": "Value" }, value, edits),
+      h("td", { "data-label": "One count" }, row.unit || "–"),
       h("td", { "data-label": "Default" }, row.default ?? "–"),
       h("td", { "data-label": "Range" }, range),
       h("td", { "data-label": "Access" }, `${row.access}${row.kept ? ", kept" : ""}`),
@@ -188,7 +191,7 @@ export function parametersView(shared, report) {
   function choose_row(row) {
     chosen = chosen === row.object ? null : row.object;
     draw();
-    list.querySelector("tr.chosen input")?.focus();
+    list.querySelector("#parameter-value")?.focus();
   }
 
   /** The description of an object, and the form that changes it. */
@@ -196,7 +199,6 @@ export function parametersView(shared, report) {
     const terms = [
       ["Name in the manual", row.title],
       ["Type", row.type],
-      ["Unit of one count", row.unit || "none"],
       ["Values", row.meanings.map(([value, text]) => `${value}: ${text}`).join("; ")],
     ].filter(([, text]) => text);
     const bytes = h("dd");
@@ -207,7 +209,7 @@ export function parametersView(shared, report) {
       setText(bytes, values.get(row.object)?.bytes ?? "–");
     };
     row.show();
-    return h("div", {}, facts, row.parameter ? form(row) : h("p", { class: "quiet" }, refusal(row)));
+    return h("div", {}, facts, row.parameter ? null : h("p", { class: "quiet" }, refusal(row)));
   }
 
   const refusal = (row) =>
@@ -216,7 +218,7 @@ export function parametersView(shared, report) {
       : "A command or a set-point: not written here. Use the Motion view to move the drive.";
 
   function form(row) {
-    const input = h("input", { id: "parameter-value", autocomplete: "off", "aria-label": `New value of ${row.name}`, placeholder: row.unit ? `number, or with its unit (${row.unit})` : "number" });
+    const input = h("input", { id: "parameter-value", size: "16", autocomplete: "off", "aria-label": `New value of ${row.name}`, placeholder: row.unit ? "number, or with unit" : "number" });
     const notice = h("span", { role: "status", id: "parameter-notice" });
     const write = h("button", { type: "submit", id: "parameter-write", class: "primary", title: inControl() ? "" : "Take control first" }, "Write");
     const submit = async (event) => {
@@ -230,7 +232,7 @@ export function parametersView(shared, report) {
       notice.className = answer.ok ? "good" : "bad";
       setText(notice, answer.ok ? outcome(answer.result) : answer.error.message);
     };
-    return h("form", { class: "bar", onsubmit: submit }, input, write, notice);
+    return h("form", { class: "bar in-row", onsubmit: submit }, input, write, notice);
   }
 
   function outcome(result) {

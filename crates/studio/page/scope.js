@@ -4,8 +4,10 @@
 
 import { against, firstOf, lastOf, samplesOf, seriesOf } from "./capture.js";
 import { choice } from "./choice.js";
+import { chooseUnit, chosenUnits } from "./chosen_units.js";
 import { h, number, setText, toggle } from "./dom.js";
 import { chooser } from "./drive.js";
+import { captureOfAnswer } from "./fast_capture.js";
 import { fastCapturePanel } from "./fast_capture_panel.js";
 import { heard, heardChooser } from "./heard.js";
 import { everything, markers, newest_s, series } from "./kept.js";
@@ -24,11 +26,12 @@ import { scalePanel } from "./scope_scales.js";
 import { overlaid, panesOf, partnerOf } from "./scope_source.js";
 import { kept, keep } from "./settings.js";
 import { SvgPen } from "./svg_pen.js";
-import { MOST_KEPT } from "./test_motion.js";
+import { MOST_KEPT, capturesOf } from "./test_motion.js";
 import { testMotionPanel } from "./test_motion_panel.js";
 import { tunePanel } from "./tune_panel.js";
 import { trigger } from "./scope_trigger.js";
-import { inUnit, unitsOf } from "./units.js";
+import { unitsOf } from "./unit_table.js";
+import { inUnit } from "./units.js";
 
 const SPANS_S = [1, 2, 5, 10, 30, 60];
 const SHORTEST_S = 1e-3;
@@ -80,16 +83,22 @@ export function scopeView(shared, report) {
     if (made.length) openCapture(made[0]);
   } });
   const gains = tunePanel(shared, report);
+  // What a sequence has captured is kept too.
+  addEventListener("played", async (/** @type {any} */ { detail: { command, result } }) => {
+    const made = command.do === "capture" ? [captureOfAnswer(result)] : command.do === "test_motion" ? capturesOf(result) : [];
+    for (const capture of made.slice(0, MOST_KEPT)) await captures.keep(capture);
+  });
   const scales = new Scales(before.scales);
   /** The units that were chosen, by field; the panes as they are without; what a turn of each node moves. */
-  const units = before.units ?? {};
+  const units = chosenUnits();
   let offered = [];
+  /** The field of the pane whose scale is chosen. */
+  let paneField = null;
   const feeds = new Map();
   const unit = choice("scope-unit", "Unit", [], { onchange: () => {
     const field = unit.dataset.field;
     if (field === undefined) return;
-    units[field] = unit.value;
-    store();
+    chooseUnit(field, unit.value);
   } });
   const scale = scalePanel(scales, () => areas, store);
   const root = h(
@@ -135,7 +144,7 @@ export function scopeView(shared, report) {
   }
 
   function store() {
-    keep(SETTINGS, { hidden: [...hidden], together: together.checked, span_s: Number(seconds.value), scales: scales.kept(), units });
+    keep(SETTINGS, { hidden: [...hidden], together: together.checked, span_s: Number(seconds.value), scales: scales.kept() });
   }
 
   /** The drawn drives, the chosen one first. */
@@ -276,7 +285,12 @@ export function scopeView(shared, report) {
   }
 
   function offerPanes(all) {
+    const before = scale.pane();
     scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key)?.label ?? key })));
+    // In another unit a pane has another key, and stays the chosen one.
+    const same = all.find(({ field }) => field === paneField);
+    if (scale.pane() !== before && same && areas.some(({ key }) => key === same.key)) scale.choose(same.key);
+    paneField = all.find(({ key }) => key === scale.pane())?.field ?? paneField;
     offerUnits(all.find(({ key }) => key === scale.pane()) ?? all[0]);
     const key = all.map((one) => one.key).join("\n");
     if (below.dataset.key === key) return;

@@ -3,10 +3,73 @@
 //
 // A step is `{ after_s, command }`: the time since the step before, and what was sent.
 
+import { SHAPES } from "./test_motion.js";
+
 /** `60 r/min` and the like as they are written: at most six significant digits, no exponent. */
 const figure = (value) => String(Number(Number(value).toPrecision(6)));
 
-/** The forms of each command that is recorded; `shown` for people. */
+/** `2008:00`, as files and command lines write `2008h:00`. */
+const objectOf = (object) => object.replace("h:", ":");
+/** A file of parameters (docs: `ferrodrive params`) with these values as they were typed. */
+const valuesFile = (values) => ["[values]", ...values.map(({ object, value }) => `"${objectOf(object)}" = ${JSON.stringify(value)}`)];
+const ms = (value) => `${figure(value)}ms`;
+const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
+
+/** The options of a test motion: of its fields those that its shape has, and its limits where they are given. */
+function testMotionOptions({ motion, quantities, capture_ms }) {
+  const has = SHAPES.find(({ value }) => value === motion.shape).fields;
+  const of = (name, option, form) => (has.includes(name) || !(name in FIELD_OF_SHAPE) ? (motion[name] === null ? [] : [[option, form(motion[name])]]) : []);
+  return [
+    ...of("by_deg", "by", (value) => `${figure(value)}deg`),
+    ...of("speed_rpm", "speed", (value) => `${figure(value)}rpm`),
+    ...of("frequency_hz", "frequency", figure),
+    ...of("to_frequency_hz", "to-frequency", figure),
+    ...of("periods", "periods", figure),
+    ...of("time_s", "time", (value) => ms(value * 1e3)),
+    ["count", figure(motion.count)],
+    ...of("velocity_rpm", "velocity", (value) => `${figure(value)}rpm`),
+    ...of("acceleration_rpm_s", "acceleration", (value) => `${figure(value)}rpm/s`),
+    ...of("travel_turns", "travel", figure),
+    ...of("following_error_deg", "following-error", (value) => `${figure(value)}deg`),
+    ...of("period_ms", "period", ms),
+    ...(quantities.length ? [["capture", quantities.join()]] : []),
+    ...(capture_ms === null ? [] : [["rate", ms(capture_ms)]]),
+  ];
+}
+/** Fields that only some shapes have. */
+const FIELD_OF_SHAPE = { by_deg: 0, speed_rpm: 0, frequency_hz: 0, to_frequency_hz: 0, periods: 0, time_s: 0 };
+
+/** The same as arguments in Python, whose units are in the names. */
+function testMotionArguments({ motion, quantities, capture_ms }) {
+  const has = SHAPES.find(({ value }) => value === motion.shape).fields;
+  const of = (name, argument, form = figure) => (has.includes(name) || !(name in FIELD_OF_SHAPE) ? (motion[name] === null ? [] : [`${argument}=${form(motion[name])}`]) : []);
+  return [
+    JSON.stringify(motion.shape),
+    ...quantities.map((name) => JSON.stringify(name)),
+    ...of("by_deg", "by"),
+    ...of("speed_rpm", "speed_rpm"),
+    ...of("frequency_hz", "frequency"),
+    ...of("to_frequency_hz", "to_frequency"),
+    ...of("periods", "periods"),
+    ...of("time_s", "time"),
+    ...(motion.path.length ? [`path=[${motion.path.map(([at, deg]) => `(${figure(at)}, ${figure(deg)})`).join(", ")}]`] : []),
+    `count=${figure(motion.count)}`,
+    ...of("velocity_rpm", "velocity_rpm"),
+    ...of("acceleration_rpm_s", "acceleration_rpm_s"),
+    ...of("travel_turns", "travel_turns"),
+    ...of("following_error_deg", "following_error"),
+    ...of("period_ms", "period", (value) => figure(value / 1e3)),
+    ...(capture_ms === null ? [] : [`capture_period=${figure(capture_ms / 1e3)}`]),
+  ].join(", ");
+}
+
+/** Where a form has no word for a command, it has a line for people. */
+const LEFT_OUT = (what) => `# left out: ${what}`;
+
+/**
+ * The forms of each command that is recorded; `shown` for people. `line` is of a scenario, without the node; `cli` of the command line;
+ * `python` of a drive. One that begins with `#` is a line for people, and one of several lines is a list.
+ */
 const ROWS = {
   enable: { shown: () => "Enable", line: () => "enable", cli: ({ node }) => `enable ${node}`, python: () => "enable()" },
   disable: { shown: () => "Disable", line: () => "disable", cli: ({ node }) => `disable ${node}`, python: () => "disable()" },
@@ -32,13 +95,42 @@ const ROWS = {
     cli: ({ node, method, rpm }) => `home ${node} --method ${figure(method)}${rpm ? ` --profile-velocity ${figure(rpm)}rpm` : ""}`,
     python: ({ method, rpm }) => `home(${figure(method)}${rpm ? `, speed_rpm=${figure(rpm)}` : ""})`,
   },
+  nmt: { shown: ({ command }) => `NMT ${command}`, line: ({ command }) => `nmt ${command}`, cli: ({ node, command }) => `nmt ${node} ${command}`, python: ({ node, command }) => [`network.nmt(${JSON.stringify(command)}, ${node})`] },
+  store: { shown: () => "Store the parameters", line: ({ node }) => LEFT_OUT(`node ${node}: store the parameters`), cli: ({ node }) => `save ${node}`, python: () => "save()" },
+  write_parameters: {
+    shown: ({ values }) => `Write ${values.map(({ object, value }) => `${object} = ${value}`).join(", ")}`,
+    line: ({ values }) => values.map(({ object, value }) => `write ${objectOf(object)} ${value}`),
+    cli: ({ node, values }) => [`cat > node${node}.toml <<'END'`, ...valuesFile(values), "END", `ferrodrive params apply ${node} node${node}.toml`],
+    python: ({ node, values }) => [`with open("node${node}.toml", "w") as file:`, `    file.write(${JSON.stringify(`${valuesFile(values).join("\n")}\n`)})`, `network.params(${node}).apply("node${node}.toml")`],
+  },
+  capture: {
+    shown: ({ quantities, period_ms, duration_ms, trigger }) => `Capture ${quantities.join(", ")} every ${ms(period_ms)} for ${figure(duration_ms / 1e3)} s${trigger ? ` from ${trigger}` : ""}`,
+    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.capture.shown(command)}`),
+    cli: ({ node, quantities, period_ms, duration_ms, trigger, pre_ms, sdo }) => `capture ${node} ${quantities.join(" ")} --for ${ms(duration_ms)} --rate ${ms(period_ms)}${trigger ? ` --trigger ${quoted(trigger)}${pre_ms ? ` --pre ${ms(pre_ms)}` : ""}` : ""}${sdo ? " --sdo" : ""} -o node${node}.mcap  # waits for its end`,
+    python: ({ quantities, period_ms, duration_ms, trigger, pre_ms, sdo }) => `capture(${quantities.map((name) => JSON.stringify(name)).join(", ")}, duration=${figure(duration_ms / 1e3)}, period=${figure(period_ms / 1e3)}${trigger ? `, trigger=${JSON.stringify(trigger)}${pre_ms ? `, pre_trigger=${figure(pre_ms / 1e3)}` : ""}` : ""}${sdo ? ", sdo=True" : ""})  # waits for its end`,
+  },
+  test_motion: {
+    shown: ({ motion }) => `Test motion ${motion.shape}, ${motion.count} ${motion.count === 1 ? "run" : "runs"}`,
+    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.test_motion.shown(command)}`),
+    cli: ({ node, ...order }) => (order.motion.shape === "path" ? [LEFT_OUT(`node ${node}: a test motion along a path of ${order.motion.path.length} points; with a capture: ferrodrive test-motion ${node} path --path FILE`)] : `test-motion ${node} ${order.motion.shape} ${testMotionOptions(/** @type {any} */ (order)).map(([name, value]) => `--${name} ${value}`).join(" ")}`),
+    python: (order) => `test_motion(${testMotionArguments(order)})`,
+  },
 };
 
+/** What a command has to have so that its forms can be made of it; parameters of a file are not recorded. */
+const WHOLE = {
+  nmt: ({ command }) => typeof command === "string" && /^[a-z-]+$/.test(command),
+  write_parameters: ({ values }) => Array.isArray(values) && values.length > 0 && values.every((one) => typeof one?.object === "string" && /^[0-9A-F]{4}h:[0-9A-F]{2}$/.test(one.object) && typeof one.value === "string" && !/[\n\r]/.test(one.value)),
+  capture: ({ quantities, trigger }) => isNames(quantities) && (trigger === null || typeof trigger === "string"),
+  test_motion: ({ motion, quantities }) => isNames(quantities) && SHAPES.some(({ value }) => value === motion?.shape) && Array.isArray(motion.path),
+};
+const isNames = (names) => Array.isArray(names) && names.every((name) => typeof name === "string" && /^[\w.:]+$/.test(name));
+
 /** Whether a command is one that a sequence has. */
-export const isRecorded = ({ do: word }) => Object.hasOwn(ROWS, word);
+export const isRecorded = (command) => Object.hasOwn(ROWS, command.do) && (!Object.hasOwn(WHOLE, command.do) || WHOLE[command.do](command));
 
 /** Commands that leave the motion of a drive as it is, a jog too. */
-const LEAVE_MOTION = ["enable", "reset_fault"];
+const LEAVE_MOTION = ["enable", "reset_fault", "capture", "store", "nmt"];
 
 /**
  * What is kept of commands that are sent: `take(command)` and `end()` give lists of commands. A jog is a turn that ends with a stop,
@@ -82,26 +174,38 @@ export const keptSteps = (steps) =>
 /** A line for people: `+1.50 s  node 4: Turn at 60 r/min`. */
 export const shownStep = ({ after_s, command }, at) => `${at > 0 ? `+${after_s.toFixed(2)} s ` : ""}node ${command.node}: ${ROWS[command.do].shown(command)}`;
 
-/** As commands of a shell; `bus` as the studio has it. */
-export function commandLine(steps, bus) {
+/** The models of the nodes that steps are about, as far as they have a name: an identity may fit several. */
+function modelsOf(steps, models) {
+  const nodes = new Set(steps.map(({ command }) => command.node));
+  return models.filter(({ node, model }) => nodes.has(node) && /^[a-z0-9-]+$/.test(model));
+}
+
+/** As commands of a shell; `bus` as the studio has it, `models` is the model of each node. */
+export function commandLine(steps, bus, models = []) {
   const lines = steps.flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    return [...(pause === null ? [] : [`sleep ${pause}`]), `ferrodrive ${ROWS[step.command.do].cli(step.command)}`];
+    const said = ROWS[step.command.do].cli(step.command);
+    return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
   });
   // A virtual bus begins and ends with each command: there it has to be one that stays, served by ferrodrive sim.
   const export_ = bus === "sim" ? "export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim --serve socketcand://127.0.0.1:29536" : `export FERRODRIVE_BUS='${bus}'`;
-  return ["#!/bin/sh", "set -e", export_, ...lines, ""].join("\n");
+  const known = modelsOf(steps, models).map(({ node, model }) => ` --model ${node}=${model}`);
+  const own = known.length ? [`ferrodrive() { command ferrodrive${known.join("")} "$@"; }`] : [];
+  return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ""].join("\n");
 }
 
 /** As a program in Python. */
-export function python(steps, bus) {
+export function python(steps, bus, models = []) {
+  const known = new Map(modelsOf(steps, models).map(({ node, model }) => [node, `, ${JSON.stringify(model)}`]));
   const nodes = [...new Set(steps.map(({ command }) => command.node))];
   const lines = steps.flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    return [...(pause === null ? [] : [`    network.sleep(${pause})`]), `    node_${step.command.node}.${ROWS[step.command.do].python(step.command)}`];
+    const said = ROWS[step.command.do].python(step.command);
+    const own = Array.isArray(said) ? said.map((text) => text.replace(`params(${step.command.node})`, `params(${step.command.node}${known.get(step.command.node) ?? ""})`)) : [`node_${step.command.node}.${said}`];
+    return [...(pause === null ? [] : [`network.sleep(${pause})`]), ...own].map((text) => `    ${text}`);
   });
   const on = bus === "sim" ? "socketcand://127.0.0.1:29536/can0" : bus;
-  return ["import ferrodrive", "", `with ferrodrive.Network("${on}") as network:`, ...nodes.map((node) => `    network.wait_for(${node})\n    node_${node} = network.drive(${node})`), ...lines, ""].join("\n");
+  return ["import ferrodrive", "", `with ferrodrive.Network("${on}") as network:`, ...nodes.map((node) => `    network.wait_for(${node})\n    node_${node} = network.drive(${node}${known.get(node) ?? ""})`), ...lines, ""].join("\n");
 }
 
 /** As a scenario for `ferrodrive run`; `models` is the model of each node, of which all that are known are in its machine. */
@@ -109,7 +213,9 @@ export function scenario(steps, models) {
   const drives = models.map(({ node, model }) => `    { model = "${model}", node = ${node} },`);
   const lines = steps.flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    return [...(pause === null ? [] : [`    "wait ${pause}s",`]), `    "${step.command.node} ${ROWS[step.command.do].line(step.command)}",`];
+    const said = [ROWS[step.command.do].line(step.command)].flat();
+    const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(`${step.command.node} ${text}`)},`));
+    return [...(pause === null ? [] : [`    "wait ${pause}s",`]), ...own];
   });
   return ['title = "Recorded in the studio"', "", "[machine]", "drive = [", ...drives, "]", "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");
 }

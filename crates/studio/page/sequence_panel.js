@@ -25,7 +25,7 @@ export function sequencePanel(isAccepted) {
   const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
   const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
   const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
-  const hint = h("p", { class: "quiet" }, "A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not.");
+  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, homing, NMT, parameters that are typed in their row and stored, captures and test motions. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not.");
   const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
   let steps = keptSteps(kept(KEY, []));
   /** What records; null while nothing is recorded. */
@@ -120,6 +120,8 @@ export function sequencePanel(isAccepted) {
       mine.nodes.add(command.node);
       // Not awaited: the next command comes when it came, and replaces a motion that is not done.
       ask(command).then((answer) => {
+        // The Scope view keeps what was captured.
+        if (answer.ok) dispatchEvent(new CustomEvent("played", { detail: { command, result: answer.result } }));
         if (playing !== mine || answer.ok || answer.error.kind === "replaced") return;
         // The answer to a command may come before the news of the stop that ended it.
         const why = `ended at ${at + 1}: ${answer.error.message}`;
@@ -133,7 +135,7 @@ export function sequencePanel(isAccepted) {
   function code() {
     const bus = link.state?.bus.name ?? "can0";
     const models = (link.state?.nodes ?? []).filter(({ model }) => model);
-    return { line: () => commandLine(steps, bus), python: () => python(steps, bus), scenario: () => scenario(steps, models) }[form.value]();
+    return { line: () => commandLine(steps, bus, models), python: () => python(steps, bus, models), scenario: () => scenario(steps, models) }[form.value]();
   }
 
   function saveText() {

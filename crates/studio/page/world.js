@@ -4,6 +4,7 @@ import { ask, inControl } from "./link.js";
 import { h, number, setText } from "./dom.js";
 import { alternatives, commandForm, subject } from "./world_form.js";
 import { drivePicture } from "./world_picture.js";
+import { worldSliders } from "./world_sliders.js";
 
 /** Drawings a second: the next state is requested when the previous one has come. */
 const PICTURE_MS = 33;
@@ -24,7 +25,8 @@ export function worldView(shared, report) {
   const groups = h("div", { class: "world-groups" });
   const answer = h("p", { id: "world-answer", role: "status" });
   const list = h("ol", { class: "world-changes", reversed: true });
-  const controls = h("fieldset", { class: "world-controls" }, free, h("h2", { class: "small" }, "Done so far"), list, groups);
+  const sliders = worldSliders(perform);
+  const controls = h("fieldset", { class: "world-controls" }, sliders.root, free, h("h2", { class: "small" }, "Done so far"), list, groups);
   const root = h("section", { class: "world" }, about, cards, answer, controls);
 
   /** The drawing of each drive, by place. */
@@ -64,19 +66,25 @@ export function worldView(shared, report) {
     setText(about, `Chosen: drive ${place}. The drawings show where the shafts truly are. The forms below are for the chosen drive; press a drawing to choose another.`);
   }
 
+  /** As everywhere else: by node-ID, whatever the order of the machine file. */
+  const inOrder = (one, other) => one.localeCompare(other, "en", { numeric: true });
+
   function take(seen) {
+    const before = pictures.size;
     for (const node of seen.nodes) {
       if (!pictures.has(node.place)) {
         const picture = drivePicture(`${node.place} ${node.model}`);
         picture.root.addEventListener("click", () => choose(node.place));
         picture.root.dataset.place = node.place;
         pictures.set(node.place, picture);
-        cards.append(picture.root);
       }
       pictures.get(node.place).update(node);
     }
+    if (pictures.size !== before) cards.replaceChildren(...[...pictures.keys()].sort(inOrder).map((of) => pictures.get(of).root));
     if (!pictures.has(place)) choose(pictures.has(String(shared.node)) ? String(shared.node) : seen.nodes[0]?.place);
-    inputs = Object.keys(seen.nodes.find((node) => node.place === place)?.inputs ?? {});
+    const chosen = seen.nodes.find((node) => node.place === place);
+    if (chosen) sliders.update(chosen);
+    inputs = Object.keys(chosen?.inputs ?? {});
     bodies = seen.bodies;
     const key = JSON.stringify([inputs, bodies]);
     if (forms && namesKey !== key) {

@@ -77,3 +77,69 @@ test("what is kept and is not a step is left out", () => {
   assert.deepEqual(keptSteps({}), []);
   assert.equal(shownStep(steps[2], 2), "+1.50 s node 2: Move by -90°");
 });
+
+const motion = { shape: "sine", by_deg: 20, speed_rpm: 60, frequency_hz: 1, to_frequency_hz: 5, periods: 3, time_s: 0.5, count: 2, velocity_rpm: 60, acceleration_rpm_s: null, travel_turns: 2, following_error_deg: 72, period_ms: 10, path: [] };
+const measured = [
+  { after_s: 0, command: { do: "nmt", node: 4, command: "start" } },
+  { after_s: 0, command: { do: "write_parameters", node: 4, values: [{ object: "2008h:00", value: "60rpm" }, { object: "6083h:00", value: '"5"' }] } },
+  { after_s: 0, command: { do: "store", node: 4 } },
+  { after_s: 1, command: { do: "capture", node: 4, quantities: ["velocity", "6041h:00"], period_ms: 1, duration_ms: 2000, trigger: "velocity>10", pre_ms: 50, sdo: false } },
+  { after_s: 0, command: { do: "test_motion", node: 4, motion, quantities: ["velocity"], capture_ms: 2, sdo: false } },
+];
+
+test("parameters, captures and test motions have the words of the command line", () => {
+  assert.equal(
+    commandLine(measured, "can0"),
+    `#!/bin/sh
+set -e
+export FERRODRIVE_BUS='can0'
+ferrodrive nmt 4 start
+cat > node4.toml <<'END'
+[values]
+"2008:00" = "60rpm"
+"6083:00" = "\\"5\\""
+END
+ferrodrive params apply 4 node4.toml
+ferrodrive save 4
+sleep 1
+ferrodrive capture 4 velocity 6041h:00 --for 2000ms --rate 1ms --trigger 'velocity>10' --pre 50ms -o node4.mcap  # waits for its end
+ferrodrive test-motion 4 sine --by 20deg --frequency 1 --periods 3 --count 2 --velocity 60rpm --travel 2 --following-error 72deg --period 10ms --capture velocity --rate 2ms
+`,
+  );
+  const path = { after_s: 0, command: { ...measured[4].command, motion: { ...motion, shape: "path", path: [[0, 0], [1, 90]] } } };
+  assert.match(commandLine([path], "can0"), /^# left out: node 4: a test motion along a path of 2 points; .*test-motion 4 path --path FILE$/m);
+  assert.match(python([path], "can0"), /test_motion\("path", "velocity", path=\[\(0, 0\), \(1, 90\)\], count=2, velocity_rpm=60,/);
+});
+
+test("and those of Python, and a scenario what it has words for", () => {
+  const text = python(measured, "can0");
+  for (const line of [
+    '    network.nmt("start", 4)',
+    '    with open("node4.toml", "w") as file:',
+    '        file.write("[values]\\n\\"2008:00\\" = \\"60rpm\\"\\n\\"6083:00\\" = \\"\\\\\\"5\\\\\\"\\"\\n")',
+    '    network.params(4).apply("node4.toml")',
+    "    node_4.save()",
+    '    node_4.capture("velocity", "6041h:00", duration=2, period=0.001, trigger="velocity>10", pre_trigger=0.05)  # waits for its end',
+    '    node_4.test_motion("sine", "velocity", by=20, frequency=1, periods=3, count=2, velocity_rpm=60, travel_turns=2, following_error=72, period=0.01, capture_period=0.002)',
+  ]) assert.ok(text.includes(`${line}\n`), line);
+  const lines = scenario(measured, [{ node: 4, model: "zlac8030l" }]);
+  for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    # left out: node 4: store the parameters', '    # left out: node 4: Test motion sine, 2 runs']) assert.ok(lines.includes(`${line}\n`), line);
+});
+
+test("of a kept sequence only what its forms can be made of is taken", () => {
+  assert.deepEqual(keptSteps(measured), measured);
+  const [nmt, write, , capture, test_motion] = measured.map(({ command }) => command);
+  const wrong = [
+    { ...nmt, command: "start; rm" }, { ...write, values: [] }, { ...write, values: [{ object: "2008h:00", value: "1\nEND" }] }, { ...write, values: [{ object: "$(rm)", value: "1" }] },
+    { ...capture, quantities: ["$(rm)"] }, { ...test_motion, motion: { ...motion, shape: "spiral" } }, { do: "write_parameters", node: 4, file: "[values]" },
+  ];
+  assert.deepEqual(keptSteps(wrong.map((command) => ({ after_s: 1, command }))), []);
+});
+
+test("a model that is known is named where an identity may fit several", () => {
+  const models = [{ node: 4, model: "zlac8030l" }, { node: 2, model: "zlim42c" }];
+  const lines = commandLine(measured, "can0", models).split("\n");
+  assert.equal(lines[3], 'ferrodrive() { command ferrodrive --model 4=zlac8030l "$@"; }');
+  const text = python(measured, "can0", models);
+  for (const line of ['    node_4 = network.drive(4, "zlac8030l")', '    network.params(4, "zlac8030l").apply("node4.toml")']) assert.ok(text.includes(`${line}\n`), line);
+});

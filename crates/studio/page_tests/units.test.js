@@ -4,7 +4,9 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { seriesOf } from "../page/capture.js";
-import { inUnit, unitsOf } from "../page/units.js";
+import { perSecond, inOther } from "../page/unit_field.js";
+import { conversion, unitsOf } from "../page/unit_table.js";
+import { inUnit } from "../page/units.js";
 
 const line = (node, values, more = {}) => ({ node, name: `node ${node}`, isCapture: false, series: seriesOf({ times: Float64Array.from(values, (_, at) => at), values: Float64Array.from(values) }), ...more });
 const pane = (unit, lines, more = {}) => ({ key: "x", field: "x", unit, decimals: 1, lines, ...more });
@@ -48,4 +50,18 @@ test("the values of a capture are converted once, those of a running picture as 
   assert.equal(last(), 1);
   live.series.values[0] = 120;
   assert.equal(last(), 2);
+});
+
+test("a conversion is a factor, and none where nothing is known to move", () => {
+  const factor = (...of) => Number(conversion(...of)?.factor.toPrecision(9) ?? NaN);
+  assert.equal(factor("°", "turns"), 0.00277777778);
+  // A wheel of 0.5 m around: 360 degrees are 500 mm, and 60 r/min are 0.5 m/s.
+  assert.deepEqual([factor("°", "mm", 0.5) * 360, factor("r/min", "m/s", 0.5) * 60].map((value) => Number(value.toPrecision(6))), [500, 0.5]);
+  for (const [unit, chosen, feed_m] of [["°", "mm", null], ["°", "°", 1], ["°", undefined, 1], ["V", "mm", 1]]) assert.equal(conversion(unit, chosen, feed_m), null, `${unit} ${chosen}`);
+});
+
+test("what a field says is the same in another unit", () => {
+  assert.equal(inOther(90, 1, 1 / 360), 0.25);
+  assert.equal(inOther(0.25, 1 / 360, Math.PI / 180), 1.5708);
+  assert.deepEqual(["r/min", "rad/s", "mm/s"].map(perSecond), ["r/min/s", "rad/s²", "mm/s²"]);
 });
