@@ -74,7 +74,7 @@ export function capturePanel({ take, open }) {
   }
 
   function row(capture) {
-    const pressed = toggle(`over-${capture.id}`, "Lay over", over.has(capture.id), () => (pressed.checked ? over.add(capture.id) : over.delete(capture.id)), { "aria-label": `Lay ${capture.name} over the picture` });
+    const pressed = toggle(`over-${capture.id}`, "Lay over", over.has(capture.id), () => (pressed.checked ? over.add(capture.id) : over.delete(capture.id)), { "aria-label": `Lay over: ${capture.name}` });
     const name = h("input", { value: capture.name, size: "28", maxlength: LONGEST_NAME, "aria-label": "Name of the capture" });
     name.addEventListener("change", () => {
       if (name.value.trim() === "") return (name.value = capture.name);

@@ -64,9 +64,14 @@ impl Studio {
 
     /// Waits until the three drives of the embedded bus are known. Asking all node-IDs takes a while.
     pub fn scanned(&self) -> Value {
-        self.wait("three drives", |state| {
+        self.found(3)
+    }
+
+    /// The same of a bus with so many drives.
+    pub fn found(&self, drives: usize) -> Value {
+        self.wait(&format!("{drives} drives"), |state| {
             let nodes = state["nodes"].as_array();
-            nodes.is_some_and(|nodes| nodes.len() == 3 && nodes.iter().all(|node| !node["drive"].is_null()))
+            nodes.is_some_and(|nodes| nodes.len() == drives && nodes.iter().all(|node| !node["drive"].is_null()))
         })
     }
 }

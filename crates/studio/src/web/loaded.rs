@@ -1,6 +1,6 @@
 //! A log of frames that a page has loaded, shown as the trace of the bus is: the same lines, by the models of this bus's nodes.
 //!
-//! The studio keeps the newest one, for whoever looks at it by its number; a page whose log was replaced by that of another page is
+//! The studio keeps the newest one, which pages ask for by its number; a page whose log was replaced by that of another page is
 //! answered with 404, and loads it again.
 
 use std::sync::{Arc, Mutex, PoisonError};

@@ -4,19 +4,25 @@
 //! `target/studio` to be looked at.
 
 mod axe;
+mod drives;
 mod fast_capture;
+mod faults;
 mod figures;
+mod first_visit;
 mod group;
 mod help;
 mod homing;
 mod measuring;
+mod parameters;
 mod pdo;
 mod safety;
 mod scope;
 mod sending;
 mod tour;
+mod trace;
 mod turning;
 mod watch;
+mod wizard;
 mod world;
 
 use std::io::{BufRead, BufReader};
@@ -29,8 +35,8 @@ use fantoccini::elements::Element;
 use fantoccini::error::{CmdError, ErrorStatus};
 use fantoccini::key::Key;
 use fantoccini::{Client, ClientBuilder, Locator};
+use processes::PATIENCE;
 use processes::studio::Studio;
-use processes::{PATIENCE, Simulator};
 use serde_json::{Value, json};
 
 const WHEEL: usize = 2;
@@ -60,8 +66,13 @@ impl Stage {
 
     /// The same on a bus that `arguments` name.
     async fn open_on(name: &str, arguments: &[&str]) -> Self {
+        Self::open_with(name, arguments, 3).await
+    }
+
+    /// The same on a bus of so many drives.
+    async fn open_with(name: &str, arguments: &[&str], drives: usize) -> Self {
         let studio = Studio::start(arguments);
-        studio.scanned();
+        studio.found(drives);
         let mut driver = Command::new("chromedriver");
         // With its browser a group of processes, which ends as one.
         driver.process_group(0);
@@ -299,7 +310,18 @@ fn press(key: char) -> KeyActions {
 async fn a_drive_is_found_enabled_moved_and_stopped() {
     let stage = Stage::open("moved").await;
     stage.shoot("bus").await;
-    stage.take_the_wheel().await;
+    // Without control it is said why nothing can be commanded, with the button for it.
+    stage.click("#tabs [data-name=motion]").await;
+    stage.choose_drive("motion", 3).await;
+    stage.says("#motion-why", "Nothing can be commanded here until this page has control").await;
+    stage.find(".motion fieldset[disabled]").await;
+    stage.click("#motion-take").await;
+    stage.find("#motion-why[hidden]").await;
+    stage.find(".motion fieldset:not([disabled])").await;
+    // In turns a quarter is what 90 degrees are: the field has that, and the drive obeys it.
+    stage.choose("#motion-unit-angle_degrees", "turns").await;
+    stage.says("label[for=move-degrees]", "turns").await;
+    assert_eq!(stage.script("return document.querySelector('#move-degrees').value").await, "0.25");
     stage.click("#sequence summary").await;
     stage.click_for("#sequence-record", "#sequence-record[aria-pressed=true]").await;
     stage.click("#enable").await;
@@ -307,6 +329,8 @@ async fn a_drive_is_found_enabled_moved_and_stopped() {
     stage.click("#go-move").await;
     let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
     stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
+    let shown = stage.says(".motion .tile:first-child b", "0.2").await.parse::<f64>().expect("a number");
+    assert!((shown - 0.25).abs() < 2.0 / 360.0, "{shown} turns");
     stage.turn().await;
     stage.shoot("motion").await;
     stage.client.perform_actions(press(' ')).await.expect("a key");
@@ -362,229 +386,5 @@ async fn a_jog_ends_with_the_button_the_key_and_the_tab() {
     stage.rests();
     stage.wheel("a quick stop", |wheel| wheel["drive"]["state"] != "Operation enabled");
     stage.studio.wait("no session in control", |state| state["controller"].is_null());
-    stage.close().await;
-}
-
-#[tokio::test]
-#[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn the_trace_says_what_passes_and_a_filter_hides_the_rest() {
-    let stage = Stage::open("trace").await;
-    stage.take_the_wheel().await;
-    stage.click("#go-move").await;
-    let angle = |wheel: &Value| wheel["drive"]["angle_degrees"].as_f64().expect("an angle");
-    stage.wheel("a quarter of a turn", |wheel| (angle(wheel) - 90.0).abs() < 2.0);
-    stage.click("#tabs [data-name=trace]").await;
-    // What the studio itself reads is hidden until it is asked for.
-    stage.line("SDO node 4: wrote 6040h:00 controlword = ").await;
-    let readings = "return [...document.querySelectorAll('.trace-row')].filter((row) => row.textContent.includes(': read ')).length";
-    assert_eq!(stage.client.execute(readings, vec![]).await.expect("it runs"), 0);
-    stage.shoot("trace").await;
-    stage.find("#trace-nodes").await.send_keys("4").await.expect("typed");
-    stage.find("#trace-text").await.send_keys("target_position").await.expect("typed");
-    // 90 degrees of 4096 counts a turn (ZLAC8030L).
-    stage.line("SDO node 4: wrote 607Ah:00 target_position = 1024").await;
-    // The list stands still while it is read.
-    stage.click("#trace-pause").await;
-    stage.find("#trace-pause[aria-pressed=true]").await;
-    let words = stage.client.find_all(Locator::Css(".trace-list .trace-row")).await.expect("lines");
-    assert!(!words.is_empty());
-    for line in words {
-        let text = line.text().await.expect("text");
-        assert!(text.contains("target_position") && text.contains("node 4"), "the filter let through: {text}");
-    }
-    stage.click("#theme").await;
-    stage.shoot("trace_filtered_other_theme").await;
-    stage.click("#trace-save-log").await;
-    let saved = stage.saved("trace.log").await;
-    let decoded =
-        processes::ferrodrive(&["--bus", &format!("log:{}", saved.display()), "--model", "4=zlac8030l", "dump"]);
-    assert_eq!(decoded.status, Some(0), "{}", decoded.err);
-    assert!(decoded.out.contains("write 607Ah:00 target_position = 1024"), "{}", decoded.out);
-    assert!(!decoded.out.contains("node 2"), "of node 4 alone");
-    other_forms_hold_the_same(&stage, &saved).await;
-    identifiers_and_the_cursor(&stage).await;
-    stage.close().await;
-}
-
-/// Wireshark's form, read by the command line, has at least the frames that candump's had some time before.
-async fn other_forms_hold_the_same(stage: &Stage, candump: &std::path::Path) {
-    stage.click("#trace-save-pcapng").await;
-    let packed = stage.saved("trace.pcapng").await;
-    let decode = |file: &std::path::Path| {
-        let bus = format!("log:{}", file.display());
-        let decoded = processes::ferrodrive(&["--bus", &bus, "--model", "4=zlac8030l", "--json", "dump"]);
-        assert_eq!(decoded.status, Some(0), "{}", decoded.err);
-        let line = |line: &str| serde_json::from_str::<Value>(line).expect("JSON")["frame"].clone();
-        decoded.out.lines().map(line).filter(|frame| frame.is_string()).collect::<Vec<_>>()
-    };
-    let (earlier, later) = (decode(candump), decode(&packed));
-    assert!(earlier.len() > 100 && later.starts_with(&earlier), "{} and {} frames", earlier.len(), later.len());
-}
-
-/// A line that is pressed is where the cursor of the scope stands, and back; by COB-ID the studio's readings show their period.
-async fn identifiers_and_the_cursor(stage: &Stage) {
-    stage.click(".trace-list .trace-row").await;
-    stage.find(".trace-row.chosen-line").await;
-    stage.choose("#trace-delta", "chosen").await;
-    stage.says(".trace-row.chosen-line span", "0.000000").await;
-    stage.click("#tabs [data-name=scope]").await;
-    stage.says(".readout", "A at ").await;
-    stage.click("#tabs [data-name=trace]").await;
-    stage.click("#trace-cursor").await;
-    stage.find(".trace-row.chosen-line").await;
-    for field in ["#trace-nodes", "#trace-text"] {
-        stage.client.execute("const field = document.querySelector(arguments[0]); field.value = ''; field.dispatchEvent(new Event('input'))", vec![field.into()]).await.expect("cleared");
-    }
-    stage.click("#trace-pause").await;
-    stage.find("#trace-pause[aria-pressed=false]").await;
-    stage.click("#trace-quiet").await;
-    stage.click("#trace-by-id").await;
-    stage.find(".identifiers tr[data-id='604']").await;
-    // The studio asks each of three drives for some values nine times a second: several requests in each 113 ms.
-    let period = "const cells = document.querySelectorAll(\".identifiers tr[data-id='604'] td\"); return [Number(cells[3].textContent), Number(cells[4].textContent)]";
-    stage
-        .until("a period of the requests", async || {
-            let read = stage.client.execute(period, vec![]).await.expect("it runs");
-            let (count, period_ms) = (read[0].as_f64().unwrap_or(0.0), read[1].as_f64().unwrap_or(0.0));
-            count > 50.0 && period_ms > 1.0 && period_ms < 113.0
-        })
-        .await;
-    stage.shoot("trace_by_id").await;
-    stage.click("#send summary").await;
-    stage.click("#send .send").await;
-    stage.says("#send-status", "604#4041600000000000 sent; sent: SDO node 4: read 6041h:00").await;
-}
-
-#[tokio::test]
-#[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn the_trace_draws_what_is_in_view_and_fetches_what_is_older() {
-    let stage = Stage::open("trace_scrolled").await;
-    let kept = |script: &'static str| async {
-        // A list that is not full is as tall as its view, which is not a whole number of lines.
-        stage.client.execute(script, vec![]).await.expect("it runs").as_f64().expect("a number") as u64
-    };
-    const FIRST: &str = "return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
-    const DRAWN: &str = "return document.querySelectorAll('.trace-list .trace-row').length";
-    const TALL: &str = "return document.querySelector('.trace-list').scrollHeight / 24";
-    stage.click("#tabs [data-name=trace]").await;
-    stage.click("#trace-quiet").await;
-    stage.click("#trace-transfers").await;
-    stage.until("lines that do not fit into the view", async || kept(TALL).await > 500).await;
-    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
-    let newest = kept(FIRST).await;
-    stage.until("new lines, of which the newest are in view", async || kept(FIRST).await > newest).await;
-    stage.click("#trace-pause").await;
-    stage.find("#trace-pause[aria-pressed=true]").await;
-    // Each time it comes to the top there is more above, until the first frame of all.
-    let up = "const list = document.querySelector('.trace-list'); list.scrollTop = 0; \
-              return Number(document.querySelector('.trace-list .trace-row').dataset.number)";
-    stage.until("the first frame of all", async || kept(up).await == 0).await;
-    assert!(kept(DRAWN).await < 60, "only what is in view is drawn");
-    stage.close().await;
-}
-
-/// ZLAC8030L quick start guide V1.00, chapters 8 and 9: 0001h is over-voltage.
-#[tokio::test]
-#[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
-    let drives = ["zlac8030l@4", "m4230e17b50@1", "zlim42c@2"].map(|drive| ["--drive", drive]).concat();
-    let mut simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
-    let bus = simulator.bus("socketcand");
-    let stage = Stage::open_on("faults", &["--bus", &bus, "--model", "4=zlac8030l", "--model", "2=zlim42c"]).await;
-    let ok = simulator.ask("4 supply 80");
-    assert_eq!(ok["ok"], true, "{ok}");
-    stage.wheel("a fault", |wheel| wheel["drive"]["fault_code"] == 1);
-    // The page is opened anew: what happened before is there.
-    stage.load().await;
-    stage.click("#tabs [data-name=faults]").await;
-    stage.click(".happening.emcy.lasts").await;
-    stage.says("#remedy", "bleeder resistor").await;
-    stage.says("#fault-source", "ZLAC8030L quick start guide V1.00, chapters 8 and 9").await;
-    stage.says(".around .marked", "EMCY node 4: 0001h (over-voltage)").await;
-    stage.shoot("faults").await;
-    stage.click(".around a").await;
-    let saved = stage.saved("node4_fault.log").await;
-    let saved = std::fs::read_to_string(saved).expect("text");
-    assert!(saved.contains(" 084#0100") && saved.lines().count() > 3, "{saved}");
-    stage.click(".happening.emcy").await;
-    // Above stands what came next: the keys go through the list.
-    stage.client.perform_actions(press(Key::Up.into())).await.expect("a key");
-    stage.client.release_actions().await.expect("a release");
-    stage.find(".happening.emcy:not([aria-pressed=true])").await;
-    stage.find(".happening:not(.emcy)[aria-pressed=true]:focus").await;
-    stage.says("#concerns", "1 drive with a fault").await;
-    stage.click("#tabs [data-name=bus]").await;
-    stage.find("#bus-filter").await.send_keys("over-voltage").await.expect("typed");
-    stage
-        .until("the drive with the fault alone", async || {
-            let listed = stage.client.find_all(Locator::Css(".bus tbody tr")).await.expect("rows");
-            listed.len() == 1
-        })
-        .await;
-    stage.says("#bus-summary", "3 nodes · 3 drives · 0 enabled · 1 drive with a fault").await;
-    simulator.ask("4 supply 48");
-    stage.click("#take").await;
-    stage.find("#release").await;
-    stage.click("#concerns").await;
-    // The remedy of a fault has its button.
-    stage.click(".happening.emcy.lasts").await;
-    stage.click(".fault-detail [data-does=reset_fault]").await;
-    stage.wheel("no fault", |wheel| wheel["drive"]["fault_code"] == 0);
-    stage.find("#concerns[hidden]").await;
-    stage.find(".happening.emcy:not(.lasts)").await;
-    stage.click("#theme").await;
-    stage.shoot("faults_other_theme").await;
-    stage.close().await;
-}
-
-#[tokio::test]
-#[ignore = "needs a browser: cargo xtask test --only studio"]
-async fn a_parameter_is_found_changed_and_rolled_back() {
-    let stage = Stage::open("parameters").await;
-    stage.take_the_wheel().await;
-    stage.click("#tabs [data-name=parameters]").await;
-    stage.click(".parameters details.group:nth-of-type(1) summary").await;
-    stage.find(".parameters details[open] tbody tr:nth-child(2)").await;
-    stage.shoot("parameters").await;
-    // A space in a text field is one, as long as nothing moves.
-    stage.find("#parameters-search").await.send_keys("2008 speed").await.expect("typed");
-    let row = ".parameters tr[data-object='2008h:00']";
-    // ZLAC8030L quick start guide V1.00, chapter 9: 1 r/min as delivered, 1 to 300.
-    stage.says(row, "1 r/min").await;
-    stage.click(row).await;
-    stage.find("#parameter-value").await.send_keys("500").await.expect("typed");
-    stage.click("#parameter-write").await;
-    stage.says("#parameter-notice", "1 to 300").await;
-    let field = stage.find("#parameter-value").await;
-    field.clear().await.expect("cleared");
-    field.send_keys("60rpm").await.expect("typed");
-    stage.click("#parameter-write").await;
-    stage.says("#parameter-notice", "Written and read back").await;
-    stage.says(row, "60 r/min").await;
-    stage.find(".parameters tr.changed[data-object='2008h:00']").await;
-    stage.says(".parameters tr.chosen", "3C 00").await;
-    stage.click("#theme").await;
-    stage.shoot("parameters_other_theme").await;
-    stage.click("#parameters-backup").await;
-    let kept = std::fs::read_to_string(stage.saved("node4.toml").await).expect("text");
-    assert!(kept.contains("\"2008:00\" = 60"), "{kept}");
-    stage.click("#parameters-backup-dcf").await;
-    let kept = stage.saved("node4.dcf").await;
-    stage.click("#parameters-back").await;
-    stage.says(row, "1 r/min").await;
-    stage.find("#parameters-file").await.send_keys(&kept.to_string_lossy()).await.expect("chosen");
-    stage.says("#parameters-notice", "node4.dcf").await;
-    stage.says("#parameters-notice", "1 differ from the drive").await;
-    let file = stage.profile.join("node4.toml");
-    stage.find("#parameters-file").await.send_keys(&file.to_string_lossy()).await.expect("chosen");
-    stage.says("#parameters-notice", "1 differ from the drive").await;
-    stage.find(".parameters-diff tr.other").await;
-    stage.click("#parameters-plan").await;
-    stage.says("#parameters-notice", "1 write, in this order").await;
-    stage.says(".parameters-diff", "60 r/min").await;
-    stage.shoot("parameters_file").await;
-    stage.click("#parameters-apply").await;
-    stage.says("#parameters-notice", "1 write done and read back").await;
-    stage.says(row, "60 r/min").await;
     stage.close().await;
 }

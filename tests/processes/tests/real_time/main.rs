@@ -8,6 +8,7 @@ mod interrupted;
 mod killed;
 mod modbus;
 mod params;
+mod prompt;
 mod realtime;
 mod recording;
 mod run_served;

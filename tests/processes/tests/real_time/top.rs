@@ -15,7 +15,7 @@ const LINES: NonZero<u16> = NonZero::new(24).expect("it is not 0");
 const COLUMNS: NonZero<u16> = NonZero::new(80).expect("it is not 0");
 
 /// A terminal of 80 columns and 24 lines with the program in it; killed when dropped.
-struct Terminal {
+pub(super) struct Terminal {
     script: Child,
     keys: ChildStdin,
     /// What a person sees.
@@ -27,12 +27,17 @@ struct Terminal {
 impl Terminal {
     /// `None` where no terminal can be made.
     fn open(bus: &str) -> Option<Self> {
+        Self::of(&format!("--bus {bus} top"))
+    }
+
+    /// The same with these arguments.
+    pub(super) fn of(arguments: &str) -> Option<Self> {
         if Command::new("script").arg("--version").output().is_err() {
             eprintln!("skipped: there is no `script` here, which gives a command a terminal");
             return None;
         }
         let program = processes::program();
-        let line = format!("stty cols 80 rows 24; exec {program} --bus {bus} top");
+        let line = format!("stty cols 80 rows 24; exec {program} {arguments}");
         let mut script = Command::new("script");
         script.args(["-q", "-f", "-e", "-c", &line, "/dev/null"]).env("TERM", "xterm").env("NO_COLOR", "1");
         let cache = processes::scratch("top-cache");
@@ -72,7 +77,7 @@ impl Terminal {
         });
     }
 
-    fn press(&mut self, key: &str) {
+    pub(super) fn press(&mut self, key: &str) {
         self.keys.write_all(key.as_bytes()).unwrap();
         self.keys.flush().unwrap();
     }
@@ -83,7 +88,7 @@ impl Terminal {
     }
 
     /// Waits until something is on the screen.
-    fn wait_for(&self, text: &str) {
+    pub(super) fn wait_for(&self, text: &str) {
         wait_for(text, || {
             let seen = self.screen.lock().unwrap().screen().contents();
             if seen.contains(text) { Ok(()) } else { Err(format!("on the screen is\n{seen}")) }

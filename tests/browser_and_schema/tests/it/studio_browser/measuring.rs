@@ -29,6 +29,7 @@ async fn a_test_motion_is_run_and_a_search_for_gains_is_stopped() {
     stage.has_done("#test-start", "#test-status", "The drive stands without power").await;
     stage.says("#test-had", "rise, 0 to 60 r/min").await;
     stage.shoot("test_motion").await;
+    stage.is_usable("a test motion").await;
     stage.form("tune").await;
     // What is going to happen is said, with the limits, and has to be agreed to.
     let warning = stage.says("#tune-warning", "120 r/min at most").await;

@@ -15,16 +15,20 @@ use super::{PATIENCE, Stage, press, speed};
 /// The stepper of the embedded bus, by its place: nothing stops it when the studio dies.
 const STEPPER: usize = 1;
 
-pub(super) const VIEWS: [&str; 9] =
-    ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world"];
+pub(super) const VIEWS: [&str; 10] =
+    ["bus", "drive", "motion", "scope", "parameters", "pdo", "trace", "faults", "world", "console"];
 
 impl Stage {
-    /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as its contents. By a
-    /// command of Chromium's own (Chrome DevTools Protocol), which its driver passes on.
+    /// A window of this size; narrow ones as those of a device that is touched, whose layout is as wide as its contents.
     pub(super) async fn device(&self, width: u32, height: u32) {
-        let session = self.client.session_id().await.expect("it answers").expect("it has begun");
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 1000 });
-        let body = json!({ "cmd": "Emulation.setDeviceMetricsOverride", "params": metrics }).to_string();
+        self.devtools("Emulation.setDeviceMetricsOverride", metrics).await;
+    }
+
+    /// A command of Chromium's own (Chrome DevTools Protocol), which its driver passes on.
+    pub(super) async fn devtools(&self, command: &str, parameters: Value) {
+        let session = self.client.session_id().await.expect("it answers").expect("it has begun");
+        let body = json!({ "cmd": command, "params": parameters }).to_string();
         let stream = TcpStream::connect(&self.driver_address).expect("the driver listens");
         // The watchdog's clock: a driver that hangs ends the test.
         stream.set_read_timeout(Some(PATIENCE)).expect("it takes it");
@@ -36,7 +40,7 @@ impl Stage {
         (&stream).write_all((head + &body).as_bytes()).expect("it is sent");
         let mut answer = String::new();
         BufReader::new(&stream).read_line(&mut answer).expect("it answers");
-        assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
+        assert!(answer.starts_with("HTTP/1.1 200"), "{command}: {answer}");
     }
 
     pub(super) async fn script(&self, script: &str) -> Value {
@@ -261,14 +265,17 @@ async fn by_the_keyboard_everything_is_chosen_and_nothing_moves_by_enter_or_a_le
     stage.close().await;
 }
 
-/// Where the stop stands, in a page that is scrolled to its end.
-const SEEN: &str = "scrollTo(0, document.body.scrollHeight); \
+/// Where the newest piece of news stands, wherever the page is scrolled to; and the stop, in a page that is scrolled to its end.
+const SEEN: &str = "const isSeen = () => { const of = document.querySelector('#news').getBoundingClientRect(); \
+      return of.top >= 0 && of.bottom <= visualViewport.height && of.height > 12 && Boolean(document.elementFromPoint(of.left + 20, of.top + 12)?.closest('#news li')) }; \
+    scrollTo(0, 0); const above = isSeen(); \
+    scrollTo(0, document.body.scrollHeight); \
     const of = document.querySelector('#stop').getBoundingClientRect(), view = visualViewport; \
     const top = document.elementFromPoint((of.left + of.right) / 2, (of.top + of.bottom) / 2)?.id; \
     const bus = document.querySelector('#bus-line'); \
     const bar = document.querySelector('header'); \
     const stays = Math.max(...[bar, document.querySelector('#tabs')].filter((one) => getComputedStyle(one).position === 'sticky').map((one) => one.getBoundingClientRect().height)); \
-    return { left: of.left, top: of.top, right: of.right - view.width, bottom: of.bottom - view.height, \
+    return { news: above && isSeen(), left: of.left, top: of.top, right: of.right - view.width, bottom: of.bottom - view.height, \
              scale: view.scale, wide: document.documentElement.scrollWidth - innerWidth, id: top, \
              cut: bus.scrollWidth - bus.clientWidth, stays: stays / view.height, text: bus.textContent }";
 
@@ -278,15 +285,17 @@ fn is_right(seen: &Value) -> bool {
     let is_inside = number("left") >= 0.0 && number("top") >= 0.0 && number("right") <= 0.0 && number("bottom") <= 0.0;
     let fits = number("wide") <= 0.0 && (number("scale") - 1.0).abs() < 1e-6 && number("cut") <= 0.0;
     let says_load = seen["text"].as_str().is_some_and(|text| text.contains("load "));
-    is_inside && fits && says_load && seen["id"] == "stop" && number("stays") < 0.17
+    is_inside && fits && says_load && seen["news"] == true && seen["id"] == "stop" && number("stays") < 0.17
 }
 
 #[tokio::test]
 #[ignore = "needs a browser: cargo xtask test --only studio"]
 async fn stop_is_on_the_screen_in_every_view_at_every_width() {
     let stage = Stage::open("widths").await;
-    stage.click("#take").await;
-    stage.find("#release").await;
+    stage.take_the_wheel().await;
+    // A refusal, which is news: no drive here is so fast.
+    stage.fill("#velocity-rpm", "1e9").await;
+    stage.click_for("#go-turn", "#news li.bad").await;
     for view in VIEWS {
         stage.script(&format!("document.querySelector('#tabs [data-name={view}]').click()")).await;
         stage.find(&format!("#tabs [data-name={view}][aria-current=page]")).await;

@@ -2,6 +2,8 @@
 
 use serde_json::Value;
 
+use fantoccini::actions::{Actions, InputSource, MOUSE_BUTTON_LEFT, PointerAction, TouchActions};
+
 use super::{Key, Locator, PATIENCE, Stage, press};
 
 #[tokio::test]
@@ -43,8 +45,82 @@ async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
     let (first, last) = (&samples[0], &samples[samples.len() - 1]);
     assert!(first[2].abs() < 2.0 && (last[2] - 90.0).abs() < 2.0, "{saved}");
     assert!(samples.iter().any(|sample| sample[1] > 20.0), "it was seen turning: {saved}");
+    another_unit_and_a_computed_quantity(&stage).await;
+    two_fingers_zoom(&stage).await;
     captures_stay_over_a_reload(&stage).await;
     stage.close().await;
+}
+
+/// The number behind a label in the readout.
+async fn read(stage: &Stage, label: &str) -> f64 {
+    let text = stage.says(".readout", label).await;
+    let number = text
+        .split(label)
+        .nth(1)
+        .map(|rest| rest.trim_start_matches([':', ' ']).split([' ', '\n']).next().unwrap_or_default());
+    number.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{label} has no number in {text:?}"))
+}
+
+/// The position under the cursor in turns is that in degrees by 360; the derivative of the speed is shown beside it.
+async fn another_unit_and_a_computed_quantity(stage: &Stage) {
+    let degrees = read(stage, "Position").await;
+    stage.choose("#scale-pane", "angle_degrees").await;
+    stage.choose("#scope-unit", "turns").await;
+    stage.says(".readout", " turns").await;
+    let turns = read(stage, "Position").await;
+    // Three decimals, and one of the degrees.
+    assert!((turns - degrees / 360.0).abs() < 0.5e-3 + 0.05 / 360.0 + 1e-9, "{degrees}° are {turns} turns");
+    stage.choose("#scope-unit", "°").await;
+    stage.script("document.querySelector('#computed-name').closest('details').open = true").await;
+    // Not typed: Space and letters are keys of the page.
+    for (field, text) in
+        [("#computed-name", "acceleration"), ("#computed-formula", "d(speed"), ("#computed-unit", "r/min/s")]
+    {
+        stage.fill(field, text).await;
+    }
+    stage.click("#computed-add").await;
+    stage.says("#computed-status", "expected").await;
+    stage.fill("#computed-formula", "d(speed)").await;
+    stage.click("#computed-add").await;
+    stage.find("[data-computed=acceleration]").await;
+    let shown = stage.says(".readout", "acceleration").await;
+    assert!(shown.contains("r/min/s"), "{shown}");
+    stage.click("[data-computed=acceleration]").await;
+    stage
+        .until("it is removed", async || {
+            !stage.find(".readout").await.text().await.expect("text").contains("acceleration")
+        })
+        .await;
+}
+
+/// By how much a press of the arrow with Shift moves the cursor: a fiftieth of the time shown.
+async fn a_fiftieth_s(stage: &Stage) -> f64 {
+    let before = read(stage, "A at").await;
+    let press = "document.querySelector('canvas').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft', shiftKey: true, bubbles: true }))";
+    stage.script(press).await;
+    stage.until("a cursor that moved", async || (read(stage, "A at").await - before).abs() > 1e-9).await;
+    (read(stage, "A at").await - before).abs()
+}
+
+/// Two fingers on the picture that move to twice their distance: half the time is shown, as on a tablet.
+async fn two_fingers_zoom(stage: &Stage) {
+    let before_s = a_fiftieth_s(stage).await;
+    stage.script("document.querySelector('canvas').scrollIntoView({ block: 'center' })").await;
+    let canvas = stage.find("canvas").await;
+    let finger = |name: &str, side: f64| {
+        let to = |x: f64| PointerAction::MoveToElement { element: canvas.clone(), duration: None, x: side * x, y: 0.0 };
+        TouchActions::new(name.into())
+            .then(to(60.0))
+            .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT })
+            .then(to(120.0))
+            .then(PointerAction::Up { button: MOUSE_BUTTON_LEFT })
+    };
+    let both = Actions::from(finger("left", -1.0)).and(finger("right", 1.0));
+    stage.client.perform_actions(both).await.expect("two fingers");
+    stage.client.release_actions().await.expect("a release");
+    let after_s = a_fiftieth_s(stage).await;
+    // Times are shown with three decimals.
+    assert!((after_s - before_s / 2.0).abs() < 1.5e-3, "{before_s} s, then {after_s} s");
 }
 
 /// What is shown is kept, the saved record is loaded, and both are there after a reload, to be laid over each other.
@@ -135,6 +211,7 @@ async fn the_scope_draws_any_object_that_passes() {
     level.send_keys("3000").await.expect("typed");
     stage.choose("#scope-window", "1").await;
     stage.choose("#trigger-mode", "once").await;
+    stage.click_for("#trigger-keep", "#trigger-keep[aria-pressed=true]").await;
     stage.says("#trigger-status", "waiting").await;
     stage.click("#take").await;
     stage.find("#release").await;
@@ -146,6 +223,9 @@ async fn the_scope_draws_any_object_that_passes() {
     stage.click("#tabs [data-name=scope]").await;
     stage.says("#trigger-status", "fired at").await;
     stage.find("#scope-pause[aria-pressed=true]").await;
+    // Kept by itself.
+    stage.says("#capture-status", "kept as ").await;
+    stage.find(".captures li").await;
     stage.shoot("scope_triggered").await;
     stage.close().await;
 }
@@ -180,7 +260,15 @@ async fn the_scope_waits_for_its_trigger_and_measures_the_step() {
         drawing.starts_with("<svg ") && drawing.ends_with("</svg>\n") && drawing.contains(">Speed</text>"),
         "{drawing}"
     );
+    // Each value over the speed: a pane less, with a title for it.
+    stage.click_for("#scope-xy", "#scope-across:not([hidden])").await;
+    stage.choose("#scope-across", "velocity_rpm").await;
+    stage.click("#scope-svg").await;
+    let drawing = std::fs::read_to_string(stage.saved("node4 (1).svg").await).expect("text");
+    assert!(drawing.contains(" over Speed</text>") && !drawing.contains(">Speed</text>"), "{drawing}");
+    stage.shoot("scope_xy").await;
     stage.click("#scope-fft").await;
+    stage.find("#scope-xy[aria-pressed=false]").await;
     stage.shoot("scope_spectrum").await;
     stage.close().await;
 }

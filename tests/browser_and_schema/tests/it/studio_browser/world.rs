@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Locator, PATIENCE, Stage};
+use super::{Key, Locator, PATIENCE, Stage};
 
 impl Stage {
     /// Does something by its line in words.
@@ -28,6 +28,9 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     stage.turn().await;
     stage.click("#tabs [data-name=world]").await;
     stage.find("[data-place='4'][aria-pressed=true]").await;
+    // By node-ID, as everywhere else; the machine file has 4, 1, 2.
+    let places = "return [...document.querySelectorAll('.world-card')].map((of) => of.dataset.place).join()";
+    assert_eq!(stage.script(places).await, "1,2,4");
     // The wheel turns, the others rest: what is drawn is where the shafts are.
     const WHEEL: &str = "[data-place='4'] svg > g";
     let before = stage.attribute(WHEEL, "transform").await;
@@ -37,6 +40,16 @@ async fn what_happens_to_the_world_is_drawn_and_the_drives_say_so() {
     stage.to_top().await;
     stage.click(".world-changes li:first-child button").await;
     stage.says(".world-changes li:first-child b", "4 load torque 0").await;
+    // A slider stands where the supply is, and a key moves it by a volt.
+    stage
+        .until("the supply as delivered", async || {
+            stage.script("return document.querySelector('#world-slider-supply').value").await == "48"
+        })
+        .await;
+    stage.press_on("#world-slider-supply", Key::Right.into()).await;
+    stage.client.release_actions().await.expect("a release");
+    stage.says(".world-changes li:first-child b", "4 supply 49").await;
+    stage.says("[data-place='4']", "49.0 V").await;
     // A form that is made from the simulator's own words.
     stage.click("[data-place='2']").await;
     stage.find("[data-place='2'][aria-pressed=true]").await;
