@@ -111,6 +111,8 @@ pub struct Host {
     pub(crate) captured: BTreeMap<NodeId, Vec<report::Capture>>,
     /// Gains that were proposed to the session that has control, and not tried yet.
     pub(crate) tuned: BTreeMap<NodeId, Box<Tuned>>,
+    /// What the last tuning of each node came to, for its report.
+    pub(crate) tunings: BTreeMap<NodeId, report::Tuning>,
     /// The changes of the world.
     pub(crate) changes: Changes,
     /// Numbers the work that runs, so that the end of replaced work is not taken for the end of its replacement.
@@ -168,6 +170,7 @@ impl Host {
             captures: BTreeMap::new(),
             captured: BTreeMap::new(),
             tuned: BTreeMap::new(),
+            tunings: BTreeMap::new(),
             changes: Changes::default(),
             learning: BTreeMap::new(),
             traffic: BTreeMap::new(),

@@ -44,6 +44,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(master::whole::plan, module)?)?;
     module.add_function(wrap_pyfunction!(master::whole::explain, module)?)?;
     module.add_function(wrap_pyfunction!(master::capture::capture, module)?)?;
+    module.add_function(wrap_pyfunction!(master::capture_file::save_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(master::capture_file::load_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(master::capture_file::tune_capture, module)?)?;
     module.add_function(wrap_pyfunction!(master::test_motion::test_motion, module)?)?;
     module.add_function(wrap_pyfunction!(master::tune::tune_drive, module)?)?;
     module.add_function(wrap_pyfunction!(master::tune::tune_ramps_of, module)?)?;

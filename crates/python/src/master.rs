@@ -4,6 +4,7 @@
 
 pub(crate) mod axes;
 pub(crate) mod capture;
+pub(crate) mod capture_file;
 mod chosen;
 mod from_file;
 mod job;

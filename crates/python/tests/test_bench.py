@@ -45,6 +45,67 @@ def test_what_is_true_of_a_drive_is_captured_with_what_it_says(world):
             drive.capture("true_speeed")
 
 
+def test_a_trigger_keeps_what_was_before_it_and_a_capture_is_a_file_that_reads_back(world, tmp_path):
+    # Its load turns the wheel: 1 N m on 0.514 kg m² reach 30 r/min after a second and a half.
+    world[4].apply("load inertia 0.5")
+    with ferrodrive.Network(world) as network:
+        network.wait_for(4)
+        world[4].apply("load torque -1")
+        drive = network.drive(4, "zlac8030l")
+        capture = drive.capture("velocity", "position", duration=0.05, trigger="velocity > 30", pre_trigger=0.02)
+    assert capture["trigger_s"] == pytest.approx(0.02, abs=0.002) and capture["parameters"]["1800h:02"]
+    for at, speed in zip(capture["time_s"], capture["values"]["velocity_rpm"]):
+        assert (speed > 30) == (at >= capture["trigger_s"] - 1e-9), (at, speed)
+    capture["notes"] = "cold"
+    for name in ("step.mcap", "step.csv"):
+        ferrodrive.save_capture(capture, tmp_path / name)
+        read = ferrodrive.load_capture(tmp_path / name)
+        assert (read["notes"], read["node"], read["model"], read["trigger_s"]) == ("cold", 4, "zlac8030l", capture["trigger_s"])
+        assert read["values"] == capture["values"] and read["units"] == capture["units"] and read["parameters"] == capture["parameters"]
+        assert read["by"]["velocity_rpm"] == "file"
+    with pytest.raises(ferrodrive.MasterError, match="not the name of a capture"):
+        ferrodrive.save_capture(capture, tmp_path / "step.txt")
+    with pytest.raises(ferrodrive.MasterError, match="no values of node 5 are in it"):
+        ferrodrive.load_capture(tmp_path / "step.csv", 5)
+    with pytest.raises(ferrodrive.MasterError, match="no current_demand_a"):
+        ferrodrive.tune_capture(tmp_path / "step.csv")
+    other = tmp_path / "letter.csv"
+    other.write_text("Dear reader")
+    with pytest.raises(OSError):
+        ferrodrive.save_capture(capture, other)
+    assert other.read_text() == "Dear reader"
+
+
+def test_an_excited_drive_is_known_by_its_capture_as_a_file(world, tmp_path):
+    # An inertia of which 1 A makes 50 rad/s², in a loop of 2 A/(rad/s) that is computed each millisecond.
+    random, time_s, asked, current, angle = 1, [], [], [], []
+    speed = turned = target = 0.0
+    for number in range(9000):
+        if number % 7 == 0:
+            random = (random * 1103515245 + 12345) % 2**31
+            target = 10.0 + (2.0 if random & 0x10000 else -2.0)
+        amps = 2.0 * (target - speed)
+        time_s.append(number * 1e-3)
+        asked.append(target * 60 / math.tau)
+        current.append(amps)
+        angle.append(math.degrees(turned))
+        turned += (speed + 0.5e-3 * 50.0 * amps) * 1e-3
+        speed += 1e-3 * 50.0 * amps
+    traces = {"velocity_demand_rpm": asked, "current_demand_a": current, "position_deg": angle}
+    units = {"velocity_demand_rpm": "r/min", "current_demand_a": "A", "position_deg": "°"}
+    values = {name: array("d", trace) for name, trace in traces.items()}
+    capture = {"name": "", "notes": "", "node": 4, "model": "", "trigger_s": None, "time_s": array("d", time_s), "values": values, "units": units}
+    ferrodrive.save_capture({**capture, "parameters": {}}, tmp_path / "excited.csv")
+    found = ferrodrive.tune_capture(tmp_path / "excited.csv", torque_constant=0.5)
+    assert found["gain_rad_s2_a"] == pytest.approx(50.0, rel=0.03) and found["inertia_kg_m2"] == pytest.approx(0.01, rel=0.03)
+    assert found["proportional_a_s_rad"] == pytest.approx(2.0, rel=0.1)
+    rows = [row for row in found["response"] if row["coherence"] > 0.9 and 5 < row["hz"] < 50]
+    assert len(rows) > 12
+    for row in rows:
+        # 50 / (2 pi f), in dB.
+        assert row["drive"]["db"] == pytest.approx(20 * math.log10(50 / (math.tau * row["hz"])), abs=1.0) and row["twin"] is None
+
+
 def test_steps_that_come_too_far_are_stopped_and_their_run_is_kept(world):
     with ferrodrive.Network(world) as network:
         network.wait_for(4)
@@ -62,7 +123,7 @@ def test_steps_that_come_too_far_are_stopped_and_their_run_is_kept(world):
             drive.test_motion("circle")
 
 
-def test_a_wheel_is_tuned_and_has_afterwards_what_it_had(world):
+def test_a_wheel_is_tuned_and_has_afterwards_what_it_had(world, tmp_path):
     world[4].apply("load inertia 0.05")
     with ferrodrive.Network(world) as network:
         network.wait_for(4)
@@ -73,6 +134,16 @@ def test_a_wheel_is_tuned_and_has_afterwards_what_it_had(world):
         assert found["inertia_kg_m2"] == pytest.approx(0.014 + 0.05, rel=0.05)
         assert found["after"]["stable"] and found["after"]["phase_deg"] >= 40
         assert not found["applied"] and network.upload(4, 0x201D) == before
+        coherent = [row for row in found["response"] if row["coherence"] >= 0.5]
+        assert len(coherent) == found["coherent"] and len(found["response"]) == found["frequencies"]
+        # Where one mass alone turns, the wheel: torque constant over inertia and frequency, within 1 dB.
+        for row in (row for row in coherent if 8 < row["hz"] < 20):
+            gain = found["torque_constant_nm_a"] / (0.014 + 0.05) / (math.tau * row["hz"])
+            assert row["drive"]["db"] == pytest.approx(20 * math.log10(gain), abs=1.5), row
+        report = network.report(4, tmp_path / "sheet.html", tunings=[found])
+        assert report["tunings"][0]["gains"] == found["gains"] and "Tuning" in (tmp_path / "sheet.html").read_text()
+        with pytest.raises(ferrodrive.MasterError, match="it is of node 4"):
+            network.report(5, tmp_path / "other.html", "cia402", tunings=[found])
         with pytest.raises(ValueError, match="expected a current from"):
             drive.tune(current_a=0)
 

@@ -14,6 +14,12 @@ const USUAL: [&str; 8] = ["position", "velocity", "current", "supply", "x_m", "y
 /// Kinds of events that are not marked: the curves show them, or their consequences.
 const QUIET: [&str; 6] = ["boot", "nmt", "mode", "state", "store_begun", "target_reached"];
 
+/// A series of one of the records that are drawn together, with what that is called; empty where it is the only one.
+struct Drawn<'a> {
+    of: &'a str,
+    series: Series,
+}
+
 /// A picture of `recorded` within `span`, in s. `patterns` are as [`select`] takes them; none asks for the usual signals.
 ///
 /// # Errors
@@ -24,6 +30,38 @@ pub fn picture(
     patterns: &[String],
     span: RangeInclusive<f64>,
 ) -> Result<Poster, String> {
+    overlay(title, &[("", recorded)], patterns, span)
+}
+
+/// The same of several records, each with what it is called: those of the same subject are laid over each other.
+///
+/// # Errors
+/// Those of [`picture`], of any of them.
+pub fn overlay(
+    title: &str,
+    records: &[(&str, &Recorded)],
+    patterns: &[String],
+    span: RangeInclusive<f64>,
+) -> Result<Poster, String> {
+    let mut series = Vec::new();
+    for (of, recorded) in records {
+        let found = chosen(recorded, patterns, &span)?;
+        series.extend(found.into_iter().map(|series| Drawn { of, series }));
+    }
+    let mut subjects: Vec<&Subject> = Vec::new();
+    for one in &series {
+        if !subjects.contains(&&one.series.column.subject) {
+            subjects.push(&one.series.column.subject);
+        }
+    }
+    let figures = subjects.iter().map(|subject| vec![figure(subject, &series, records, &span)]);
+    let is_torn = records.iter().any(|(_, recorded)| recorded.torn);
+    let subtitle = if is_torn { "the end of the file is missing" } else { "recorded by ferrodrive" };
+    Ok(Poster { title: title.to_owned(), subtitle: subtitle.to_owned(), rows: figures.collect() })
+}
+
+/// What of a record is drawn.
+fn chosen(recorded: &Recorded, patterns: &[String], span: &RangeInclusive<f64>) -> Result<Vec<Series>, String> {
     let names: Vec<String> = recorded.series.iter().map(|series| series.column.name()).collect();
     let mut chosen = if patterns.is_empty() {
         let usual: Vec<String> = USUAL.map(str::to_owned).into();
@@ -35,19 +73,8 @@ pub fn picture(
         // A record of other signals than the usual ones.
         chosen = (0..names.len()).collect();
     }
-    let series: Vec<Series> = chosen.iter().filter_map(|i| within(&recorded.series[*i], &span)).collect();
-    if series.is_empty() {
-        return Err(nothing_there(recorded, &span));
-    }
-    let mut subjects: Vec<&Subject> = Vec::new();
-    for one in &series {
-        if !subjects.contains(&&one.column.subject) {
-            subjects.push(&one.column.subject);
-        }
-    }
-    let figures = subjects.iter().map(|subject| vec![figure(subject, &series, recorded, &span)]);
-    let subtitle = if recorded.torn { "the end of the file is missing" } else { "recorded by ferrodrive" };
-    Ok(Poster { title: title.to_owned(), subtitle: subtitle.to_owned(), rows: figures.collect() })
+    let series: Vec<Series> = chosen.iter().filter_map(|i| within(&recorded.series[*i], span)).collect();
+    if series.is_empty() { Err(nothing_there(recorded, span)) } else { Ok(series) }
 }
 
 /// The part of a series that lies in `span`; `None` if there is no value in it.
@@ -70,21 +97,27 @@ fn nothing_there(recorded: &Recorded, span: &RangeInclusive<f64>) -> String {
     "these signals have no value in it".into()
 }
 
-fn figure(subject: &Subject, series: &[Series], recorded: &Recorded, span: &RangeInclusive<f64>) -> Figure {
-    let of_it: Vec<&Series> = series.iter().filter(|series| series.column.subject == *subject).collect();
+fn figure(
+    subject: &Subject,
+    series: &[Drawn<'_>],
+    records: &[(&str, &Recorded)],
+    span: &RangeInclusive<f64>,
+) -> Figure {
+    let of_it: Vec<&Drawn<'_>> = series.iter().filter(|one| one.series.column.subject == *subject).collect();
     let mut quantities: Vec<String> = Vec::new();
     for one in &of_it {
-        let quantity = quantity(&one.column);
+        let quantity = quantity(&one.series.column);
         if !quantities.contains(&quantity) {
             quantities.push(quantity);
         }
     }
     let panels = quantities.iter().map(|name| {
-        let lines: Vec<&Series> = of_it.iter().copied().filter(|series| quantity(&series.column) == *name).collect();
+        let of_quantity = |one: &&Drawn<'_>| quantity(&one.series.column) == *name;
+        let lines: Vec<&Drawn<'_>> = of_it.iter().copied().filter(of_quantity).collect();
         panel(name, &lines)
     });
     let title = subject.title();
-    let marks = recorded.marks.iter().filter(|mark| {
+    let marks = records.iter().flat_map(|(_, recorded)| &recorded.marks).filter(|mark| {
         let about_it = mark.of.is_empty() || mark.of == title;
         about_it
             && !mark.text.starts_with(ABOUT)
@@ -114,21 +147,24 @@ fn quantity(column: &Column) -> String {
     column.signal.replace("_demand", "").replace("rotor_", "")
 }
 
-fn panel(quantity: &str, lines: &[&Series]) -> Panel {
-    let unit = lines.first().map_or_else(String::new, |series| series.column.unit.clone().into_owned());
+fn panel(quantity: &str, lines: &[&Drawn<'_>]) -> Panel {
+    let unit = lines.first().map_or_else(String::new, |one| one.series.column.unit.clone().into_owned());
     let (colour, with_zero) = look(quantity, &unit);
     // The demand first, so that the actual value lies on it.
-    let (demands, actuals): (Vec<&Series>, Vec<&Series>) =
-        lines.iter().partition(|series| series.column.signal.contains("_demand"));
+    let (demands, actuals): (Vec<&Drawn<'_>>, Vec<&Drawn<'_>>) =
+        lines.iter().partition(|one| one.series.column.signal.contains("_demand"));
     let colours = Colour::ALL.into_iter().cycle().skip_while(move |first| *first != colour);
     let traces = demands
         .into_iter()
-        .map(|series| ("demand", Style::Demand, series))
-        .chain(actuals.into_iter().zip(colours).map(|(series, colour)| {
-            let label = if series.column.signal.starts_with("rotor_") { "rotor" } else { "actual" };
-            (label, Style::Actual(colour), series)
+        .map(|one| ("demand", Style::Demand, one))
+        .chain(actuals.into_iter().zip(colours).map(|(one, colour)| {
+            let label = if one.series.column.signal.starts_with("rotor_") { "rotor" } else { "actual" };
+            (label, Style::Actual(colour), one)
         }))
-        .map(|(label, style, series)| Trace { label: label.into(), style, points: series.points.clone() });
+        .map(|(label, style, one)| {
+            let label = if one.of.is_empty() { label.to_owned() } else { format!("{label}, {}", one.of) };
+            Trace { label: label.into(), style, points: one.series.points.clone() }
+        });
     // A supply that gives a hundredth of a volt less is one that stands.
     let least_span = if matches!(unit.as_str(), "V" | "°C") { 1.0 } else { 0.0 };
     let traces = traces.collect();
@@ -200,6 +236,17 @@ mod tests {
         assert_eq!(panels(1).collect::<Vec<_>>(), ["Current, A: 1"]);
         assert_eq!(poster.rows[0][0].events.iter().map(|event| &*event.label).collect::<Vec<_>>(), ["over-voltage"]);
         assert!(poster.rows[1][0].events.is_empty());
+    }
+
+    #[test]
+    fn records_of_the_same_node_lie_over_each_other_with_their_names() {
+        let (one, two) = (recorded(), recorded());
+        let patterns = ["4.velocity_rpm".to_owned()];
+        let poster = overlay("both", &[("a.csv", &one), ("b.csv", &two)], &patterns, 0.0..=10.0).unwrap();
+        let traces = &poster.rows[0][0].panels[0].traces;
+        assert_eq!(traces.iter().map(|trace| &*trace.label).collect::<Vec<_>>(), ["actual, a.csv", "actual, b.csv"]);
+        assert_ne!(traces[0].style, traces[1].style);
+        assert_eq!((poster.rows.len(), poster.rows[0][0].panels.len(), traces[0].points.len()), (1, 1, 100));
     }
 
     #[test]

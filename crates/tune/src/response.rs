@@ -22,6 +22,8 @@ use crate::samples::{Samples, Unusable};
 /// Coherence from which a frequency counts. What is less coherent weighs less, and where the motor hardly moves, at an
 /// anti-resonance, all is.
 pub(crate) const COHERENT: f64 = 0.5;
+/// How probable a coherence is, from which a frequency is taken to be seen, where nothing follows from the excitation.
+const CHANCE: f64 = 0.01;
 /// How many frequencies it takes to say anything.
 const LEAST_LINES: usize = 12;
 /// Periods of an excitation: the first one is left out, since it begins at rest.
@@ -75,6 +77,15 @@ impl Response {
     /// Those whose coherence is high enough to count.
     pub fn coherent(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|line| line.coherence >= COHERENT)
+    }
+
+    /// Whether nothing of the excitation is seen in it any more: at too few frequencies the coherence is above what chance alone shows. Of
+    /// signals that have nothing to do with each other a coherence is above c with the probability (1 - c)^(averages - 1) (G. C. Carter,
+    /// C. H. Knapp, A. H. Nuttall, "Estimation of the magnitude-squared coherence function via overlapped fast Fourier transform
+    /// processing", IEEE Transactions on Audio and Electroacoustics 21, 1973).
+    pub fn is_lost(&self) -> bool {
+        let by_chance = 1.0 - CHANCE.powf(1.0 / (self.averages.max(2) - 1) as f64);
+        self.lines.iter().filter(|line| line.coherence > by_chance).count() < LEAST_LINES
     }
 
     /// Whether enough of them count.

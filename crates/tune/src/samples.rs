@@ -102,6 +102,18 @@ pub enum Unusable {
 }
 
 impl Samples {
+    /// The last of them.
+    #[must_use]
+    pub fn last(&self, count: usize) -> Self {
+        let end = |values: &[f64]| values[values.len().saturating_sub(count)..].to_vec();
+        Self {
+            period_s: self.period_s,
+            set_point_rad_s: end(&self.set_point_rad_s),
+            current_a: end(&self.current_a),
+            position_rad: end(&self.position_rad),
+        }
+    }
+
     /// One more sample.
     pub fn push(&mut self, set_point_rad_s: f64, current_a: f64, position_rad: f64) {
         self.set_point_rad_s.push(set_point_rad_s);

@@ -298,3 +298,85 @@ fn a_test_motion_is_judged_by_what_was_sampled() {
     let refused = ferrodrive(&["test-motion", "4", "sine", "--by", "90deg", "--frequency", "5"]);
     assert!(refused.status == Some(1) && refused.err.contains("are allowed"), "{}", refused.err);
 }
+
+#[test]
+fn captures_are_taken_as_often_as_was_asked_for_each_into_a_file_of_its_own() {
+    let place = scratch("captures-counted");
+    let [first, second] = ["run.csv", "run-2.csv"].map(|name| place.path(name));
+    let report = done(&["capture", "4", "supply", "--for", "50ms", "--count", "2", "-o", &first, "--json"]).json();
+    assert_eq!([&report["captures"][0]["file"], &report["captures"][1]["file"]], [first.as_str(), second.as_str()]);
+    for (path, name) in [(&first, "run"), (&second, "run-2")] {
+        let capture = recording::Capture::of(&recorded(Path::new(path)), None).unwrap();
+        let [from, to] = [capture.time_s[0], capture.time_s[capture.time_s.len() - 1]];
+        assert!(capture.name == name && from == 0.0 && (to - 0.05).abs() < 2e-3, "{} {from} {to}", capture.name);
+    }
+    // Both in one picture, with the trigger at 0, which these have not.
+    let drawn = done(&["plot", &first, &second, "-o", "-", "--json"]).json();
+    let picture = drawn["picture"].as_str().unwrap();
+    assert!(picture.contains("actual, run.csv") && picture.contains("actual, run-2.csv"), "{drawn}");
+    assert_eq!((&drawn["records"][1], &drawn["signals"]), (&second.as_str().into(), &2.into()));
+    let refused = ferrodrive(&["plot", &first, &second, "--align", "trigger", "-o", "-"]);
+    assert!(refused.status == Some(1) && refused.err.contains("run.csv has no trigger"), "{}", refused.err);
+}
+
+/// A raised cosine of 20 degrees in one second, captured of another drive: that is named, and its way is gone all the same.
+#[test]
+fn a_shaft_is_moved_along_the_position_of_a_capture_and_one_of_another_drive_is_named() {
+    let place = scratch("moved-along");
+    let row = |n: u32| {
+        let at = f64::from(n) * 0.01;
+        format!("{at:.2},{:.6}\n", 10.0 * (1.0 - (std::f64::consts::TAU * at).cos()))
+    };
+    let values: String = (0..=100).map(row).collect();
+    for (node, others) in [(4, 0), (5, 1)] {
+        let path = place.write("path.csv", &format!("t_s,{node}.position_deg\n{values}"));
+        let words = ["test-motion", "4", "path", "--path", &path, "--capture", "position", "--json"];
+        let report = done(&words).json();
+        let (run, notes) = (&report["runs"][0], report["notes"].as_array().unwrap());
+        assert!((run["followed"]["took_s"].as_f64().unwrap() - 1.0).abs() < 0.05, "{run}");
+        let trace = &run["capture"]["traces"][0];
+        let [least, most] = [&trace["least"], &trace["most"]].map(|value| value.as_f64().unwrap());
+        assert!((most - 20.0).abs() < 1.0 && least.abs() < 1.0, "{trace}");
+        assert_eq!(notes.len(), others, "{report}");
+        assert!(notes.iter().all(|note| note.as_str().unwrap().contains("of node 5, and node 4")), "{report}");
+    }
+}
+
+#[test]
+fn a_tuning_and_a_test_motion_are_in_the_report_of_their_node() {
+    let place = scratch("tuned-report");
+    let [tune, step, page, picture] = ["tune.json", "step.mcap", "page.html", "tune.svg"].map(|name| place.path(name));
+    let tuned = done(&["tune", "4", "--loop", "position", "--picture", &picture, "--json"]);
+    std::fs::write(&tune, &tuned.out).unwrap();
+    let tuned = tuned.json();
+    // The picture, and the rows of it: what was measured, the model and the twin, with their coherence.
+    let drawn = std::fs::read_to_string(&picture).unwrap();
+    assert!(
+        ["coherence", "Hz", "Bode", "Frequency response"].iter().filter(|part| drawn.contains(**part)).count() >= 3
+    );
+    let rows = tuned["response"].as_array().unwrap();
+    let coherent = rows.iter().filter(|row| row["coherence"].as_f64() >= Some(0.5)).count();
+    assert_eq!(
+        (Some(coherent as u64), Some(rows.len() as u64)),
+        (tuned["coherent"].as_u64(), tuned["frequencies"].as_u64())
+    );
+    assert!(rows.windows(2).all(|pair| pair[0]["hz"].as_f64() < pair[1]["hz"].as_f64()), "ascending");
+    // A bare wheel: the median of the coherent rows is where the twin is, by as much as is said.
+    assert!(tuned["twin_move"][1]["settled_s"].as_f64() > Some(0.7), "{}", tuned["twin_move"]);
+    done(&["test-motion", "4", "steps", "--speed", "60rpm", "--time", "700ms", "-o", &step]);
+    let words = ["report", "4", "--tune", &tune, "--capture", &step, "-o", &page, "--json"];
+    let report = done(&words).json();
+    assert_eq!(report["tunings"][0]["gains"], tuned["gains"]);
+    let merit = &report["captures"][0]["merit"];
+    assert_eq!((&merit["steps"][0]["to"], &merit["steps"][1]["to"]), (&60.0.into(), &0.0.into()), "{merit}");
+    let page = std::fs::read_to_string(&page).unwrap();
+    let gain = &tuned["gains"][0];
+    for part in ["Tuning", "rise, 0 to 60 r/min", "r.m.s.", "speed_proportional_gain_kp", &gain["after"].to_string()] {
+        assert!(page.contains(part), "{part}");
+    }
+    // That of another node, and what is none.
+    for (node, path, why) in [("5", &tune, "it is of node 4 (zlac8030l)"), ("4", &step, "it is not JSON")] {
+        let refused = ferrodrive(&["report", node, "--tune", path, "-o", &place.path("other.html")]);
+        assert!(refused.status == Some(1) && refused.err.contains(why), "{}", refused.err);
+    }
+}

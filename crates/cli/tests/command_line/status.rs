@@ -229,6 +229,26 @@ fn examples_of_the_help_on_the_bus_of_its_own_run() {
     }
 }
 
+/// The same of those that write files, in a folder in which there are those that they read.
+#[test]
+fn examples_of_the_help_of_what_is_captured_moved_and_drawn_run() {
+    let folder = scratch("examples_with_files");
+    let run = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        let output = processes::command(&words).current_dir(&folder).output().unwrap();
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    let motion = "--speed 20rpm --time 20ms --acceleration 3000rpm/s --period 2ms --capture current_demand,position";
+    run(&format!("test-motion 4 prbs {motion} -o run.mcap"));
+    for command in ["capture", "test-motion", "tune"] {
+        let help = done(&[command, "-h"]).out;
+        let lines = help.lines().filter_map(|line| line.trim().strip_prefix("ferrodrive "));
+        for line in lines.filter(|line| !line.contains("--bus") && !line.contains('\'')) {
+            run(line);
+        }
+    }
+}
+
 /// With the words and the model of a node it is seen: before anything is written.
 #[test]
 fn words_that_the_model_of_a_node_does_not_have_are_a_2() {

@@ -26,6 +26,7 @@ use crate::network::report::{self, Made, NodeReport};
 use crate::parameters::transactions::Refusal;
 use crate::parameters::{STORING, answer, busy, refuse};
 use crate::state::Host;
+use crate::test_motion::Followed;
 use crate::work::{Asked, Done};
 
 /// Readings of one capture that a page is sent at most: some megabytes as JSON.
@@ -145,8 +146,10 @@ impl Host {
         self.learn_pdos(node);
         let outcome = outcome.map(|(captures, value)| {
             let kept = self.captured.entry(node).or_default();
-            for (name, capture) in captures {
-                if let Ok(row) = report::Capture::of_record(name, recorded(capture), node) {
+            for (name, capture, followed) in captures {
+                if let Ok(mut row) = report::Capture::of_record(name, recorded(capture), node) {
+                    // What a capture alone does not show.
+                    row.merit.iter_mut().for_each(|merit| merit.followed = followed);
                     kept.truncate(MOST_REPORTED - 1);
                     kept.insert(0, row);
                 }
@@ -180,13 +183,19 @@ impl Host {
         }
         let made = Made { at, by: by.filter(|by| !by.trim().is_empty()), bus: self.setting.bus.clone() };
         let captures = self.captured.get(&node).cloned().unwrap_or_default();
-        self.work.push(Box::pin(async move { Done::Looked(asked, page_of(&drive, made, captures).await) }));
+        let tunings = self.tunings.get(&node).cloned().into_iter().collect();
+        self.work.push(Box::pin(async move { Done::Looked(asked, page_of(&drive, made, captures, tunings).await) }));
     }
 }
 
-async fn page_of(drive: &Drive, made: Made, captures: Vec<report::Capture>) -> Result<Value, Refusal> {
+async fn page_of(
+    drive: &Drive,
+    made: Made,
+    captures: Vec<report::Capture>,
+    tunings: Vec<report::Tuning>,
+) -> Result<Value, Refusal> {
     let mut report = NodeReport::read(&(), drive, made).await.map_err(|failure| refusal(&failure))?;
-    report.captures = captures;
+    (report.captures, report.tunings) = (captures, tunings);
     Ok(json!({ "node": report.node, "file": format!("node{}.html", report.node), "html": report.to_html() }))
 }
 
@@ -249,6 +258,11 @@ pub(crate) async fn measurands(
 /// A capture of a node as the page has it, which began then.
 pub(crate) fn shown(node: NodeId, capture: &Capture, ways: &[Way], first_at: Instant) -> Value {
     let mut value = serde_json::to_value(Captured::of(capture, ways)).unwrap_or_default();
+    // The page has names and notes of its own.
+    value
+        .as_object_mut()
+        .into_iter()
+        .for_each(|row| ["name", "notes"].iter().for_each(|field| drop(row.remove(*field))));
     value["node"] = node.raw().into();
     value["begun_s"] = (first_at - Instant::ZERO).as_secs_f64().into();
     value
@@ -259,7 +273,7 @@ fn outcome_of(
     captured: Result<(Running, Taken), Failure>,
     left: &[String],
     nmt_back: Option<SeenBy>,
-) -> Result<(Vec<(String, Capture)>, Value), Refusal> {
+) -> Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal> {
     let (running, taken) = captured.map_err(|failure| refusal(&with_left(failure, left)))?;
     let Taken { capture, cut_off, first_at } = taken;
     if capture.time_s.is_empty() {
@@ -274,7 +288,7 @@ fn outcome_of(
     let lacks = cut_off.into_iter().chain(not_put_back(node, left).map(|failure| with_left(failure, left)));
     value["lacks"] = lacks.map(|failure| refusal(&failure).1).collect();
     let name = format!("capture of {}", names_of(&capture));
-    Ok((vec![(name, capture)], value))
+    Ok((vec![(name, capture, None)], value))
 }
 
 /// A failure in one text: what, why, and what to do.

@@ -8,6 +8,9 @@ use super::measurand::Way;
 /// A capture in plain values, as Python and the page have it.
 #[derive(Debug, Serialize)]
 pub struct Captured {
+    name: String,
+    notes: String,
+    node: u8,
     model: String,
     trigger_s: Option<f64>,
     time_s: Vec<f64>,
@@ -31,18 +34,35 @@ struct CapturedTrace {
 impl Captured {
     /// A capture whose quantities came these ways.
     pub fn of(capture: &Capture, ways: &[Way]) -> Self {
-        let traces = capture.traces.iter().zip(ways).map(|(trace, way)| CapturedTrace {
+        Self::by(capture, ways.iter().map(ToString::to_string))
+    }
+
+    /// One that was read from a file, which does not say by what its quantities came.
+    pub fn of_file(capture: &Capture) -> Self {
+        Self::by(capture, std::iter::repeat("file".to_owned()))
+    }
+
+    fn by(capture: &Capture, ways: impl Iterator<Item = String>) -> Self {
+        let traces = capture.traces.iter().zip(ways).map(|(trace, by)| CapturedTrace {
             quantity: trace.quantity.clone(),
             unit: trace.unit.clone(),
-            by: way.to_string(),
+            by,
             values: trace.values.iter().map(|value| known(*value)).collect(),
             period_s: known(trace.period_s),
             jitter_s: known(trace.jitter_s),
             gaps: trace.gaps,
         });
         let objects = capture.parameters.iter().map(|(object, bytes)| (object.to_string(), bytes.clone()));
-        let (model, trigger_s, time_s) = (capture.model.clone(), capture.trigger_s, capture.time_s.clone());
-        Self { model, trigger_s, time_s, traces: traces.collect(), objects: objects.collect() }
+        Self {
+            name: capture.name.clone(),
+            notes: capture.notes.clone(),
+            node: capture.place.node,
+            model: capture.model.clone(),
+            trigger_s: capture.trigger_s,
+            time_s: capture.time_s.clone(),
+            traces: traces.collect(),
+            objects: objects.collect(),
+        }
     }
 }
 

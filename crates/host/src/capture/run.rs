@@ -9,6 +9,7 @@ use recording::Capture;
 use serde_json::Value;
 
 use crate::parameters::transactions::Refusal;
+use crate::test_motion::Followed;
 
 /// A capture that is under way.
 pub(crate) struct CaptureRun {
@@ -22,6 +23,6 @@ pub(crate) struct CaptureOutcome {
     pub(crate) node: NodeId,
     /// The number of the motion, where it was one.
     pub(crate) generation: Option<u64>,
-    /// Captures with their names in the report of the node, and the answer.
-    pub(crate) outcome: Result<(Vec<(String, Capture)>, Value), Refusal>,
+    /// Captures with their names in the report of the node, how points were followed, and the answer.
+    pub(crate) outcome: Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal>,
 }

@@ -10,7 +10,7 @@ use master::cyclic::CyclicOptions;
 use recording::Capture;
 use serde_json::{Value, json};
 
-use super::{Motion, Order, Run, ShapeName, run, usual_quantities};
+use super::{Followed, Motion, Order, Run, ShapeName, run, usual_quantities};
 use crate::capture::commanded::{check_size, measurands, refusal, shown};
 use crate::capture::{CaptureOutcome, CaptureRun, Restorer, Wanted, WayBack, not_put_back, with_left};
 use crate::command::TestMotionOrder;
@@ -173,7 +173,7 @@ fn outcome_of(
     moved: Result<(), Refusal>,
     runs: Vec<Run>,
     (restorer, left): (&Restorer, &[String]),
-) -> Result<(Vec<(String, Capture)>, Value), Refusal> {
+) -> Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal> {
     let not_back = not_put_back(node, left).map(|failure| refusal(&with_left(failure, left)));
     // Of what was seen of no run there is the failure alone.
     if runs.is_empty() {
@@ -195,7 +195,7 @@ fn outcome_of(
     });
     let name = |number: u32| format!("test motion {}, run {number}", order.shape.word());
     let captures = runs.into_iter().filter(|run| !run.capture.time_s.is_empty());
-    Ok((captures.map(|run| (name(run.number), run.capture)).collect(), value))
+    Ok((captures.map(|run| (name(run.number), run.capture, run.figures.followed)).collect(), value))
 }
 
 fn row(node: NodeId, Run { number, figures, capture, ways, first_at }: &Run) -> Value {

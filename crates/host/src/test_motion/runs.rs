@@ -322,7 +322,43 @@ async fn once(
 }
 
 impl Figures {
-    fn of(followed: Option<Followed>, capture: &Capture) -> Self {
+    /// What, how much, and how exactly: for people.
+    pub fn rows(&self) -> Vec<[String; 3]> {
+        let mut rows = Vec::new();
+        let mut add = |what: String, value: String, grid: String| rows.push([what, value, grid]);
+        if let Some(Followed { took_s, most_deg, rms_deg }) = self.followed {
+            add("following error".into(), format!("{most_deg:.3} deg at most, {rms_deg:.3} deg r.m.s."), String::new());
+            add("time".into(), format!("{took_s:.3} s"), String::new());
+        }
+        for step in &self.steps {
+            let of = format!("{} to {} r/min", step.from, step.to);
+            for (what, figure, unit, times) in [
+                ("rise", &step.rise_s, "ms", 1e3),
+                ("overshoot", &step.overshoot, "%", 100.0),
+                ("settling", &step.settling_s, "ms", 1e3),
+            ] {
+                let (value, grid) = match figure {
+                    merit::Figure::Is { value, grid } => {
+                        (format!("{:.1} {unit}", value * times), format!("{:.1} {unit}", grid * times))
+                    }
+                    merit::Figure::Unknown { why } => (why.clone(), String::new()),
+                };
+                add(format!("{what}, {of}"), value, grid);
+            }
+        }
+        if let Some(Heating { rms_a, a2s }) = self.heating {
+            add("current".into(), format!("{rms_a:.3} A r.m.s., {a2s:.3} A²·s"), String::new());
+        }
+        rows
+    }
+
+    /// There are some.
+    pub fn are_some(&self) -> bool {
+        self.followed.is_some() || !self.steps.is_empty() || self.heating.is_some()
+    }
+
+    /// Those of a capture, and how its points were followed.
+    pub fn of(followed: Option<Followed>, capture: &Capture) -> Self {
         let (steps, no_steps) = match (&followed, steps_of(capture)) {
             (Some(_), _) => (Vec::new(), None),
             (None, Ok(steps)) => (steps, None),

@@ -152,6 +152,8 @@ const SLOW_S: f64 = 0.1;
 const SPEED_OVER_S: f64 = 8e-3;
 const PERIOD_S: f64 = 2.0;
 const PERIODS: usize = 6;
+/// Periods that are looked at together, while it is measured, for whether the shaft still follows; the first of them is what came before.
+const LOOKED_AT: usize = 4;
 const LOWEST_HZ: f64 = 1.0;
 /// Share of the sampling rate.
 const HIGHEST: f64 = 0.125;
@@ -284,7 +286,17 @@ impl Bench {
     /// A bound was reached, the drive refused, or a sample is missing. The drive is to be [`stop`](Self::stop)ped.
     pub async fn follow(&mut self, speeds_rpm: impl IntoIterator<Item = f64>) -> Result<Samples, Failure> {
         let mut samples = Samples { period_s: self.period.as_secs_f64(), ..Samples::default() };
-        let mut before = None;
+        self.follow_on(speeds_rpm, &mut samples, &mut None).await?;
+        Ok(samples)
+    }
+
+    /// The same, after what was sampled before, the last of it in this cycle.
+    async fn follow_on(
+        &mut self,
+        speeds_rpm: impl IntoIterator<Item = f64>,
+        samples: &mut Samples,
+        before: &mut Option<u64>,
+    ) -> Result<(), Failure> {
         for asked in speeds_rpm {
             let (state, shown) = self.step(Demand::Velocity(Rpm(asked))).await?;
             self.asked_rpm = asked;
@@ -297,12 +309,12 @@ impl Bench {
                 let reason = "a sample is missing: this program was late, or the bus has no room for the drive's TPDOs";
                 return Err(self.stopped(reason).next("give --realtime (Linux), or a longer --period"));
             };
-            before = cycle;
+            *before = cycle;
             let (turns, current_a) = (position as f64 / self.counts_per_turn, current as f64 * self.current_per_count);
             self.keep_bounds(turns, current_a)?;
             samples.push(asked * RAD_S_PER_RPM, current_a, turns * std::f64::consts::TAU);
         }
-        Ok(samples)
+        Ok(())
     }
 
     fn keep_bounds(&mut self, turns: f64, current_a: f64) -> Result<(), Failure> {
@@ -337,11 +349,8 @@ impl Bench {
     /// # Errors
     /// See [`follow`](Self::follow).
     pub async fn swings(&mut self) -> Result<bool, Failure> {
-        match self.steady(BIAS_SHARE * self.bounds.speed_rpm).await {
-            Ok((_, ripple_a)) => Ok(ripple_a > SWINGS * self.bounds.current_a),
-            Err(failure) if failure.kind == CURRENT_KIND => Ok(true),
-            Err(failure) => Err(failure),
-        }
+        let (_, ripple_a) = self.steady(BIAS_SHARE * self.bounds.speed_rpm).await?;
+        Ok(ripple_a > SWINGS * self.bounds.current_a)
     }
 
     /// Steady speeds, then an excitation that grows until it is seen well, within the bounds.
@@ -362,10 +371,31 @@ impl Bench {
         let factor = ENOUGH_CURRENT * self.bounds.current_a / self.excursion.peak_a.max(f64::MIN_POSITIVE);
         self.excursion.peak_a = self.excursion.peak_a.max(before_a);
         let amplitude_rpm = (small_rpm * factor).min(LARGEST * self.bounds.speed_rpm);
-        let values = (0..PERIODS * excitation.len()).map(|n| bias + amplitude_rpm * excitation.at(n));
-        let samples = self.follow(values).await?;
+        let mut samples = Samples { period_s: self.period.as_secs_f64(), ..Samples::default() };
+        let mut before = None;
+        for period in 1..=PERIODS {
+            let values = (0..excitation.len()).map(|n| bias + amplitude_rpm * excitation.at(n));
+            self.follow_on(values, &mut samples, &mut before).await?;
+            // After the last one all of it is judged.
+            if (LOOKED_AT..PERIODS).contains(&period) {
+                self.keep_coherence(&samples.last(LOOKED_AT * excitation.len()), excitation)?;
+            }
+        }
         let (excitation, gain_share) = (excitation.clone(), self.gain_share);
         Ok(Measurement { runs, samples, excitation, amplitude_rpm, gain_share })
+    }
+
+    /// What the shaft did in the last periods follows from what was asked for.
+    fn keep_coherence(&self, samples: &Samples, excitation: &Excitation) -> Result<(), Failure> {
+        let reason = match tune::response(samples, Some(excitation)) {
+            Ok(response) if response.is_lost() => "the motion no longer follows from what is asked for".to_owned(),
+            Ok(_) => return Ok(()),
+            Err(error) => error.to_string(),
+        };
+        Err(self
+            .stopped(reason)
+            .of_kind("incoherent")
+            .next("let nothing else push the shaft and nothing hold it, or allow more with --current"))
     }
 
     /// A step of the set-point, from half of the highest speed to three quarters, or by no more than this.

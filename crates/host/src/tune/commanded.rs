@@ -5,6 +5,7 @@ use canopen::NodeId;
 use futures_util::future::Abortable;
 use master::Drive;
 use master::parameters::Parameters;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use words::failure::Failure;
 
@@ -16,6 +17,7 @@ use crate::capture::{Restorer, WayBack, not_put_back, with_left};
 use crate::command::TuneCommand;
 use crate::motion::guarding::{UNGUARDED, expect_guard};
 use crate::network::params::journal::default_path;
+use crate::network::report;
 use crate::parameters::transactions::Refusal;
 use crate::parameters::{answer, busy, refuse};
 use crate::state::Host;
@@ -146,17 +148,22 @@ impl Host {
         let not_back = not_put_back(node, &left).map(|failure| refusal(&with_left(failure, &left)).1);
         let outcome = match outcome {
             Ok(tuned) => {
-                let Tuned { report, proposed, .. } = &tuned;
-                if report.applied {
+                let Tuned { report: found, proposed, .. } = &tuned;
+                if found.applied {
                     let before = proposed.gains.iter();
                     let values = before.map(|gain| (gain.object, bytes(&drive, gain.object, gain.before))).collect();
                     self.parameters.keep(node, Parameters { node: Some(node), values, ..Parameters::default() });
                 }
-                let mut value = serde_json::to_value(report).unwrap_or_default();
-                value["curves"] = serde_json::to_value(&report.curves).unwrap_or_default();
+                let mut value = serde_json::to_value(found).unwrap_or_default();
+                if let Ok(tuning) = report::Tuning::deserialize(&value) {
+                    self.tunings.insert(node, report::Tuning { picture: found.picture.to_svg(), ..tuning });
+                }
+                value["curves"] = serde_json::to_value(&found.curves).unwrap_or_default();
+                // The page has all that it draws in one place.
+                value["curves"]["response"] = value["response"].take();
                 value["lacks"] = not_back.into_iter().collect();
                 // What was tried is not tried again.
-                if report.drive_error.is_none() {
+                if found.drive_error.is_none() {
                     self.tuned.insert(node, Box::new(tuned));
                 }
                 Ok(value)

@@ -1,14 +1,13 @@
 //! What of a tuning is drawn.
 
 use serde::Serialize;
+use tune::{Complex, Line, Mechanics};
 
 use super::{StepResponse, Trial};
 
-/// Curves of a tuning.
+/// Curves of a tuning, in time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curves {
-    /// Speed per current demand, by ascending frequencies; empty for a drive that is measured by SDO, which is too slow for it.
-    pub response: Vec<ResponseRow>,
     /// The twin with the gains that the drive had, and with those proposed.
     pub twin: [Trial; 2],
     /// A step of the drive, before and after, once the values were tried there.
@@ -26,8 +25,27 @@ pub struct ResponseRow {
     pub drive: GainAndPhase,
     /// Of the model of one or two masses.
     pub model: GainAndPhase,
-    /// As it was measured of the twin.
-    pub twin: GainAndPhase,
+    /// As it was measured of the twin; `None` of a capture, which has none.
+    pub twin: Option<GainAndPhase>,
+}
+
+impl ResponseRow {
+    /// What was measured at one frequency, what the model is there, and the twin.
+    pub(super) fn of(line: &Line, model: &Mechanics, twin: Option<Complex<f64>>) -> Self {
+        Self {
+            hz: line.hz,
+            coherence: line.coherence,
+            drive: line.plant.into(),
+            model: model.response(line.omega()).into(),
+            twin: twin.map(GainAndPhase::from),
+        }
+    }
+}
+
+impl From<Complex<f64>> for GainAndPhase {
+    fn from(value: Complex<f64>) -> Self {
+        Self { db: 20.0 * value.norm().log10(), deg: value.arg().to_degrees() }
+    }
 }
 
 /// A point of a frequency response.

@@ -31,15 +31,15 @@ pub async fn measure(
         setup.prepare(drive, share).await?;
         let mut bench = Bench::open(drive, loops, period, bounds, options, *excursion).await?;
         bench.gain_share = share;
-        let swings = bench.swings().await;
-        let measured = match swings {
-            Ok(false) => match bench.measure(&excitation).await {
-                // With lower gains the same speeds take less.
-                Err(failure) if failure.kind == CURRENT_KIND && left > 0 => Ok(None),
-                measured => measured.map(Some),
-            },
+        let measured = match bench.swings().await {
+            Ok(false) => bench.measure(&excitation).await.map(Some),
             Ok(true) => Ok(None),
             Err(failure) => Err(failure),
+        };
+        let measured = match measured {
+            // With lower gains the same speeds take less.
+            Err(failure) if failure.kind == CURRENT_KIND && left > 0 => Ok(None),
+            measured => measured,
         };
         *excursion = bench.excursion;
         if let Some(measurement) = both(measured, bench.stop().await)? {

@@ -40,7 +40,7 @@ pub use ramps_twin::TwinRow;
 pub use readings::{Currents, OutputLoad, Reader, Shaft};
 pub use report::{GainRow, MarginRow, Request, TuneReport, find};
 pub use setup::Setup;
-pub use twin::{Trial, Twin, constant_of, motor_of};
+pub use twin::{MoveRow, Trial, Twin, constant_of, motor_of};
 
 use devices::{Description, Loops};
 use master::Drive;

@@ -11,6 +11,8 @@ use serde::Serialize;
 use tune::{Mechanics, Response, Samples};
 use words::failure::Failure;
 
+use super::ResponseRow;
+
 /// Signals by the names of their quantities, the best first, each with how many rad, rad/s or A its unit is.
 const SET_POINTS: [(&str, f64); 4] = [
     ("velocity_demand_rpm", RAD_S_PER_RPM),
@@ -63,6 +65,8 @@ pub struct CaptureReport {
     pub integral_a_rad: Option<f64>,
     /// What else is to be known.
     pub notes: Vec<String>,
+    /// Speed per current, by ascending frequencies: what was captured and the model.
+    pub response: Vec<ResponseRow>,
     /// The response and the model, as a Bode plot.
     #[serde(skip)]
     pub picture: Poster,
@@ -111,6 +115,7 @@ pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Resul
         proportional_a_s_rad: own.map(|own| own.proportional),
         integral_a_rad: own.map(|own| own.integral),
         notes,
+        response: response.lines.iter().map(|line| ResponseRow::of(line, &found, None)).collect(),
         picture: picture(capture, &response, &found),
     })
 }

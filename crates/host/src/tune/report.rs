@@ -16,8 +16,8 @@ use words::failure::{Failure, both};
 use crate::capture::Restorer;
 
 use super::{
-    Bounds, Currents, Curves, Excursion, Found, GainAndPhase, Measurement, OutputLoad, Proposed, Reader, ResponseRow,
-    Setup, Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of,
+    Bounds, Currents, Curves, Excursion, Found, Measurement, MoveRow, OutputLoad, Proposed, Reader, ResponseRow, Setup,
+    Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of,
 };
 
 /// How often the load of a twin is corrected, and the relative difference at which it is right.
@@ -142,15 +142,19 @@ pub struct TuneReport {
     pub position: Option<MarginRow>,
     /// A step of the set-point and a load on the twin: integral of the absolute error, r/min s, before and after.
     pub twin_error: [f64; 2],
-    /// What of it is drawn.
-    #[serde(skip)]
-    pub curves: Curves,
+    /// A move on the twin by its own ramps, before and after, where the position loop was asked for.
+    pub twin_move: Option<[MoveRow; 2]>,
     /// The same of a step on the drive, once the values were tried there.
     pub drive_error: Option<[f64; 2]>,
     /// The drive has the proposed values.
     pub applied: bool,
     /// What else is to be known.
     pub notes: Vec<String>,
+    /// Speed per current demand, by ascending frequencies; empty for a drive that is measured by SDO, which is too slow for it.
+    pub response: Vec<ResponseRow>,
+    /// What else of it is drawn.
+    #[serde(skip)]
+    pub curves: Curves,
     /// Bode plot, and the trials.
     #[serde(skip)]
     pub picture: Poster,
@@ -249,7 +253,14 @@ pub async fn find(
         notes: notes(&found, &proposed, request),
         ..rows(id.raw(), model, &found, &proposed, &trials)
     };
-    report.curves.response = response;
+    report.response = response;
+    if request.with_position {
+        let moves = [twin.try_move(&[], how.1.speed_rpm).await?, twin.try_move(&after, how.1.speed_rpm).await?];
+        if moves[1].settled_s.is_none() {
+            report.notes.push("on the twin a move does not settle with the proposed gains".to_owned());
+        }
+        report.twin_move = Some(moves);
+    }
     Ok((report, proposed))
 }
 
@@ -334,7 +345,9 @@ fn rows(node: u8, model: &Description, found: &Found, proposed: &Proposed, trial
         after: proposed.after.into(),
         position: proposed.position.map(MarginRow::from),
         twin_error: [trials[0].error(), trials[1].error()],
-        curves: Curves { response: Vec::new(), twin: trials.clone(), drive: None },
+        twin_move: None,
+        response: Vec::new(),
+        curves: Curves { twin: trials.clone(), drive: None },
         drive_error: None,
         applied: false,
         notes: Vec::new(),
@@ -367,17 +380,7 @@ fn between(drive: &Measurement, twin: &Measurement, model: &Mechanics) -> Result
         let off = |line: &&tune::Line| (line.omega() - omega).abs();
         twin.lines.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|line| line.plant).unwrap_or_default()
     };
-    let row = |line: &tune::Line| {
-        let of =
-            |value: tune::Complex<f64>| GainAndPhase { db: 20.0 * value.norm().log10(), deg: value.arg().to_degrees() };
-        ResponseRow {
-            hz: line.hz,
-            coherence: line.coherence,
-            drive: of(line.plant),
-            model: of(model.response(line.omega())),
-            twin: of(nearest(line.omega())),
-        }
-    };
+    let row = |line: &tune::Line| ResponseRow::of(line, model, Some(nearest(line.omega())));
     Ok((tune::distance(&drive, nearest), drive.lines.iter().map(row).collect()))
 }
 

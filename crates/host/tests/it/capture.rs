@@ -8,10 +8,7 @@ use can::{Bitrate, Instant};
 use canopen::{Mux, NmtCommand, NodeId};
 use host::capture::{Measurand, Pace, Restorer, Running, SeenBy, Span, Taken, Wanted, Way};
 use host::network::params::journal::roll_back_by;
-use host::test_motion::{Shape, follow, points, steps};
-use master::cyclic::CyclicOptions;
 use master::drive::MotionOptions;
-use master::group::{AxisLimits, AxisSetup, Group};
 use master::units::{Ramp, Rpm};
 use master::{Drive, Network};
 use sim::machine::{Order, order};
@@ -19,21 +16,21 @@ use sim::stimulus::Power;
 use sim::{Place, StationId, Stimulus, World, block_on, block_on_for};
 use words::failure::Failure;
 
-const MS: Duration = Duration::from_millis(1);
+pub(crate) const MS: Duration = Duration::from_millis(1);
 
-fn node() -> NodeId {
+pub(crate) fn node() -> NodeId {
     NodeId::new(4).expect("a node-ID")
 }
 
-struct Bench {
-    world: World,
+pub(crate) struct Bench {
+    pub(crate) world: World,
     station: StationId,
-    network: Network,
-    drive: Drive,
+    pub(crate) network: Network,
+    pub(crate) drive: Drive,
 }
 
 impl Bench {
-    fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let mut world = World::new(Bitrate::K500, 7);
         let network = Network::new();
         let station = world.add_station(network.clone());
@@ -46,12 +43,12 @@ impl Bench {
         Self { world, station, network, drive }
     }
 
-    fn run<T>(&mut self, what: impl Future<Output = T>) -> T {
+    pub(crate) fn run<T>(&mut self, what: impl Future<Output = T>) -> T {
         block_on(&mut self.world, what).expect("the bus goes on")
     }
 
     /// The same, with the angle that the shaft had every millisecond: times in s, degrees.
-    fn run_beside_truth<T>(&mut self, what: impl Future<Output = T>) -> (T, (Vec<f64>, Vec<f64>)) {
+    pub(crate) fn run_beside_truth<T>(&mut self, what: impl Future<Output = T>) -> (T, (Vec<f64>, Vec<f64>)) {
         let mut what = std::pin::pin!(what);
         let (mut times, mut angles) = (Vec::new(), Vec::new());
         loop {
@@ -74,7 +71,7 @@ impl Bench {
     }
 
     /// Everything about the node's TPDOs, as it reads.
-    fn tpdos(&mut self) -> BTreeMap<Mux, Vec<u8>> {
+    pub(crate) fn tpdos(&mut self) -> BTreeMap<Mux, Vec<u8>> {
         let drive = self.drive.clone();
         self.run(async {
             let mut objects = BTreeMap::new();
@@ -89,7 +86,7 @@ impl Bench {
         })
     }
 
-    fn wanted(&mut self, quantities: &[&str], journal: Option<PathBuf>) -> Wanted {
+    pub(crate) fn wanted(&mut self, quantities: &[&str], journal: Option<PathBuf>) -> Wanted {
         let (drive, world) = (self.drive.clone(), Some(self.world.live_values()));
         let quantities = self.run(async {
             let mut found = Vec::new();
@@ -102,13 +99,13 @@ impl Bench {
         Wanted { quantities, period: MS, bitrate: Bitrate::K500, take, by_sdo, journal, on_kept }
     }
 
-    fn begin(&mut self, wanted: &Wanted) -> Result<(Running, Restorer), Failure> {
+    pub(crate) fn begin(&mut self, wanted: &Wanted) -> Result<(Running, Restorer), Failure> {
         let (drive, restorer) = (self.drive.clone(), Restorer::of(&self.drive));
         self.run(wanted.begin(&drive, &restorer)).map(|running| (running, restorer))
     }
 }
 
-fn at_once(ms: u64) -> Span {
+pub(crate) fn at_once(ms: u64) -> Span {
     Span { duration: Duration::from_millis(ms), trigger: None, pre_trigger: Duration::ZERO }
 }
 
@@ -413,71 +410,5 @@ fn a_sync_that_others_send_is_followed() {
     assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(2)));
     let taken = bench.run(running.next(&at_once(200))).expect("it is captured");
     assert!((taken.capture.traces[0].period_s - 4e-3).abs() < 1e-4);
-    bench.run(restorer.restore());
-}
-
-/// Twice the amplitude from end to end, whatever the drive takes its set-points as; and the way back at the end.
-#[test]
-fn a_sine_is_followed_run_after_run_while_it_is_captured() {
-    const CYCLE: Duration = Duration::from_millis(5);
-    let mut bench = Bench::new("zlac8030l");
-    let limits = AxisLimits { velocity_turns_s: 1.0, acceleration_turns_s2: 20.0, ..AxisLimits::careful() };
-    let amplitude_turns = 10.0 / 360.0;
-    let shape = Shape::Sine { amplitude_turns, hz: 2.0, periods: 2 };
-    let path = points(&shape, &limits, CYCLE.as_secs_f64()).expect("within its limits");
-    let drive = bench.drive.clone();
-    let mode = AxisSetup::best_mode(&drive).expect("it has one");
-    let axis = AxisSetup { drive: drive.clone(), mode, limits };
-    let mut group = bench.run(Group::open(&[axis], CYCLE, CyclicOptions::default())).expect("it opens");
-    let with_group = bench.tpdos();
-    let mut wanted = bench.wanted(&["position", "current"], None);
-    wanted.period = CYCLE;
-    let restorer = Restorer::of(&drive);
-    let begun = bench.run(group.beside(wanted.begin(&drive, &restorer)));
-    let mut running = begun.expect("it begins");
-    assert_eq!(running.plan().map(|plan| plan.pace), Some(Pace::Sync(1)));
-    bench.run(group.enable()).expect("it is enabled");
-    for run in 0..2 {
-        let ((followed, taken), truth) = bench.run_beside_truth(running.during(follow(&mut group, &path)));
-        let followed = followed.unwrap_or_else(|error| panic!("run {run}: {error}"));
-        // Two periods of 0.5 s, and the cycles in which it begins and ends.
-        assert!((1.0..=1.025).contains(&followed.took_s), "run {run}: {followed:?}");
-        assert!(followed.most_deg < 0.3 && followed.rms_deg <= followed.most_deg, "run {run}: {followed:?}");
-        assert!(taken.cut_off.is_none(), "{:?}", taken.cut_off);
-        let capture = taken.capture;
-        let trace = capture.trace("position_deg").expect("a position");
-        let ends = |values: &[f64]| {
-            values.iter().fold((f64::MAX, f64::MIN), |(low, high), deg| (low.min(*deg), high.max(*deg)))
-        };
-        let (seen, had) = (ends(&trace.values), ends(&truth.1));
-        // One count is 360 / 4096 degrees; at the ends the shaft stands for longer than a cycle.
-        let count = 360.0 / 4096.0;
-        let is_near = |seen: f64, had: f64| (seen - had).abs() < count + 0.01;
-        assert!(is_near(seen.0, had.0) && is_near(seen.1, had.1), "run {run}: {seen:?}, {had:?}");
-        assert!(
-            (seen.1 - seen.0 - 20.0).abs() < 2.0 * (followed.most_deg + count),
-            "run {run}: {seen:?}, {followed:?}"
-        );
-    }
-    bench.run(group.close()).expect("it closes");
-    assert_eq!(bench.run(restorer.restore()), Vec::<String>::new());
-    assert_eq!(bench.tpdos(), with_group);
-}
-
-#[test]
-fn steps_of_velocity_end_at_rest_with_both_edges_captured() {
-    let mut bench = Bench::new("zlac8030l");
-    let wanted = bench.wanted(&["velocity", "target_velocity"], None);
-    let (mut running, restorer) = bench.begin(&wanted).expect("it begins");
-    let drive = bench.drive.clone();
-    let (done, taken) = bench.run(running.during(steps(&drive, Rpm(60.0), None, Duration::from_millis(800), None)));
-    done.expect("it moves");
-    assert!(taken.cut_off.is_none(), "{:?}", taken.cut_off);
-    let capture = taken.capture;
-    let demand: Vec<f64> = capture.trace("target_velocity_rpm").expect("a demand").values.clone();
-    let edges: Vec<_> = demand.windows(2).filter(|pair| pair[0] != pair[1]).map(|pair| (pair[0], pair[1])).collect();
-    assert_eq!(edges, [(0.0, 60.0), (60.0, 0.0)]);
-    assert!(bench.world.report(4).expect("the drive").velocity_rpm.abs() < 1.0);
-    assert!(!bench.network.moved().contains(node()));
     bench.run(restorer.restore());
 }

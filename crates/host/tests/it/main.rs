@@ -2,6 +2,7 @@
 //! program: a file each.
 
 mod capture;
+mod capture_motion;
 mod clients;
 mod control;
 mod follow;
@@ -13,3 +14,4 @@ mod tune_capture;
 mod tune_joint;
 mod tune_named;
 mod tune_ramps;
+mod tune_random;

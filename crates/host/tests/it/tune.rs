@@ -1,6 +1,6 @@
-//! What is identified of a drive is held to what its plant has, over a bus as a program has it; and so are the gains proposed.
+//! A drive that is measured and given gains: its bounds, what stops it, and that it has afterwards what it had. What is identified is held to
+//! its plant in `tune_random`.
 
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use can::{Bitrate, Frame, Instant, Station};
 use canopen::{Mux, NodeId};
-use devices::{Description, Loops};
 use host::capture::Restorer;
 use host::network::Progress;
 use host::network::params::journal::roll_back_by;
@@ -25,168 +24,37 @@ use sim::{MotorData, Place, Prng, World};
 use tune::Objective;
 use words::failure::Failure;
 
-const PERIOD: Duration = Duration::from_millis(1);
-
-/// What hangs on a wheel.
-#[derive(Clone, Debug)]
-struct Load {
-    inertia_kg_m2: f64,
-    coulomb_nm: f64,
-    viscous_nm_s: f64,
-    stiffness_nm_rad: Option<f64>,
-}
-
-/// What the plant has: closed forms of its own equations (`plant::gear`, `plant::attachment`).
-#[derive(Clone, Debug)]
-struct Truth {
-    inertia_kg_m2: f64,
-    dry_nm: f64,
-    viscous_nm_s: f64,
-    /// Anti-resonance and resonance, Hz.
-    elastic: Option<(f64, f64)>,
-}
-
-impl Load {
-    /// Resonances from 15 to 100 Hz: what samples each millisecond and 4096 counts a turn show.
-    fn random(random: &mut Prng, motor: &MotorData) -> Self {
-        let rotor = motor.rotor.inertia_kg_m2;
-        let mut between =
-            |low: f64, high: f64| low * (high / low).powf(random.below(1 << 20) as f64 / f64::from(1 << 20));
-        let inertia_kg_m2 = between(0.004, 0.1);
-        let (coulomb_nm, viscous_nm_s) = (between(0.05, 0.6), between(0.002, 0.03));
-        let reduced = 1.0 / (1.0 / (inertia_kg_m2 + 0.01 * rotor) + 1.0 / rotor);
-        let stiffness_nm_rad = (TAU * between(15.0, 100.0)).powi(2) * reduced;
-        Self {
-            inertia_kg_m2,
-            coulomb_nm,
-            viscous_nm_s,
-            stiffness_nm_rad: random.chance(0.5).then_some(stiffness_nm_rad),
-        }
-    }
-
-    fn words(&self) -> Vec<String> {
-        let Self { inertia_kg_m2, coulomb_nm, viscous_nm_s, stiffness_nm_rad } = self;
-        let friction = format!("load friction {coulomb_nm} viscous {viscous_nm_s}");
-        let gear = stiffness_nm_rad.map(|stiffness| format!("load gear 1 0 {stiffness}"));
-        [format!("load inertia {inertia_kg_m2}"), friction].into_iter().chain(gear).collect()
-    }
-
-    fn truth(&self, motor: &MotorData) -> Truth {
-        let rotor = motor.rotor;
-        // The output wheel of a load's gear.
-        let wheel = if self.stiffness_nm_rad.is_some() { 0.01 * rotor.inertia_kg_m2 } else { 0.0 };
-        let load = self.inertia_kg_m2 + wheel;
-        let hz = |square: f64| square.sqrt() / TAU;
-        let both = |stiffness: f64| (hz(stiffness / load), hz(stiffness / load + stiffness / rotor.inertia_kg_m2));
-        Truth {
-            inertia_kg_m2: rotor.inertia_kg_m2 + load,
-            dry_nm: rotor.coulomb_nm + self.coulomb_nm,
-            viscous_nm_s: rotor.viscous_nm_s + self.viscous_nm_s,
-            elastic: self.stiffness_nm_rad.map(both),
-        }
-    }
-}
-
-struct Measured {
-    found: Found,
-    setup: Setup,
-    model: (&'static Description, &'static Loops),
-}
+pub(crate) const PERIOD: Duration = Duration::from_millis(1);
 
 /// A motor with its torque per ampere.
 pub(crate) fn with_constant(motor: &MotorData) -> (&MotorData, f64) {
     (motor, motor.windings.torque_constant_nm_a())
 }
 
-/// `Err` where it is refused as unusable.
-fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Measured, tune::Unusable> {
+/// What is identified of a drive, with its motor's torque per ampere.
+fn identified(world: &mut World, drive: &Drive, motor: &MotorData) -> Result<Found, tune::Unusable> {
+    measured(world, drive, with_constant(motor), Bounds::default()).map(|(found, _)| found)
+}
+
+pub(crate) fn measured(
+    world: &mut World,
+    drive: &Drive,
+    (motor, constant): (&MotorData, f64),
+    bounds: Bounds,
+) -> Result<(Found, Setup), tune::Unusable> {
     let (model, loops) = loops_of(drive).unwrap();
     let run = async {
         let setup = Setup::begin((drive, &Restorer::of(drive)), (model, loops), true, None, |_| ()).await.unwrap();
-        let how = (PERIOD, Bounds::default(), CyclicOptions::default());
+        let how = (PERIOD, bounds, CyclicOptions::default());
         let measured = measure(drive, &setup, loops, how, &mut Excursion::default()).await;
         (setup, measured)
     };
     let (setup, measured) = sim::block_on(world, run).unwrap();
-    let found = Found::of(&measured.unwrap(), &setup, loops, (motor, motor.windings.torque_constant_nm_a()))?;
-    Ok(Measured { found, setup, model: (model, loops) })
+    Ok((Found::of(&measured.unwrap(), &setup, loops, (motor, constant))?, setup))
 }
 
-fn relative(is: f64, should: f64) -> f64 {
+pub(crate) fn relative(is: f64, should: f64) -> f64 {
     (is / should - 1.0).abs()
-}
-
-/// Fifty with `FERRODRIVE_MACHINES=50`, which takes half a minute of a core.
-fn machines() -> usize {
-    std::env::var("FERRODRIVE_MACHINES").ok().and_then(|text| text.parse().ok()).unwrap_or(5)
-}
-
-/// Inertia within 5 %, friction within 10 %, resonance within 2 %. An anti-resonance, where the motor moves by less than one of
-/// its counts, within 5 %.
-fn hold(number: usize, found: &Found, truth: &Truth) {
-    let within = |what: &str, is: f64, should: f64, bound: f64| {
-        assert!(
-            relative(is, should) < bound,
-            "machine {number}: {what} {is}, the plant has {should}, found {:?} {:?}",
-            found.mechanics,
-            found.friction
-        );
-    };
-    within("inertia", found.inertia_kg_m2(), truth.inertia_kg_m2, 0.05);
-    within("dry friction", found.dry_nm(), truth.dry_nm, 0.1);
-    within("viscous friction", found.viscous_nm_s(), truth.viscous_nm_s, 0.1);
-    assert_eq!(found.mechanics.elastic.is_some(), truth.elastic.is_some(), "machine {number}: {truth:?}");
-    if let (Some(elastic), Some((anti_resonance_hz, resonance_hz))) = (found.mechanics.elastic, truth.elastic) {
-        within("resonance", elastic.resonance_hz, resonance_hz, 0.02);
-        within("anti-resonance", elastic.anti_resonance_hz, anti_resonance_hz, 0.05);
-    }
-}
-
-#[test]
-fn random_wheels_are_identified_and_gains_proposed_for_them_are_stable_and_nearly_always_better() {
-    let model = devices::model("zlac8030l").unwrap();
-    let motor = motor_of(model).unwrap();
-    let loops = model.axes[0].loops.as_ref().unwrap();
-    let mut random = Prng::new(11);
-    let (mut worse, mut refused) = (Vec::new(), Vec::new());
-    let count = machines();
-    for number in 0..count {
-        let load = Load::random(&mut random, &motor);
-        let plant = Twin::with_load((model, loops), load.words(), with_constant(&motor));
-        let (mut world, drive) = plant.world().unwrap();
-        let Measured { found, setup, model } = match identified(&mut world, &drive, &motor) {
-            Ok(measured) => measured,
-            Err(reason) => {
-                refused.push(format!("{number}: {reason}"));
-                continue;
-            }
-        };
-        hold(number, &found, &load.truth(&motor));
-        let proposed = Proposed::of(&found, &setup, model, Objective::PhaseMargin(40.0), false).unwrap();
-        let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
-        // The plant itself, with a step of the set-point and of the load.
-        let how = (PERIOD, Bounds { current_a: 30.0, ..Bounds::default() });
-        let (old, new) = (tried(&plant, &[], how), tried(&plant, &after, how));
-        // A slow loop may still be on its way at the end: it comes nearer, and does not swing.
-        let off = |answer: &StepResponse, last: usize| {
-            let from = answer.speed_rpm.len() - last;
-            (answer.speed_rpm[from..from + 100].iter().sum::<f64>() / 100.0 - answer.step_rpm.1).abs()
-        };
-        for answer in [&new.step, &new.load] {
-            let (before, end, ripple_a) = (off(answer, 200), off(answer, 100), answer.ripple_a());
-            assert!(
-                end < before.max(1.0) && end < 3.0,
-                "machine {number} does not settle: {before} {end} {proposed:?}"
-            );
-            assert!(ripple_a < 1.5, "machine {number} swings by {ripple_a} A: {proposed:?}");
-        }
-        if new.error() >= old.error() {
-            worse.push(number);
-        }
-    }
-    // A loop that swings with half of its gains and less excites a heavy wheel too little.
-    assert!(refused.len() * 20 <= count, "refused: {refused:#?}");
-    assert!(worse.len() * 10 <= count, "worse than as delivered: {worse:?} of {count}");
 }
 
 #[test]
@@ -205,6 +73,83 @@ fn what_is_written_for_a_measurement_is_put_back_and_a_bound_that_is_reached_sto
     assert!(failure.because[0].contains("turns from where it stood, more than 0.5"), "{failure:?}");
     assert_eq!(values(&mut world, &drive, &WRITTEN), before);
     assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+}
+
+/// More friction than the current that is allowed holds, with any gains; and a drive that is stopped so stands, with what it had.
+#[test]
+fn a_speed_loop_that_asks_for_more_current_than_is_allowed_is_stopped() {
+    let (mut world, drive) = wheel(&["load inertia 0.1", "load friction 2 viscous 0.01"]).world().unwrap();
+    let before = values(&mut world, &drive, &WRITTEN);
+    let bounds = Bounds { current_a: 1.0, ..Bounds::default() };
+    let (request, mut excursion) = (Request { bounds, ..request() }, Excursion::default());
+    let restorer = Restorer::of(&drive);
+    let run = find((&drive, &restorer), &request, &mut excursion);
+    let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+    assert_eq!(failure.kind, "current_bound", "{failure:?}");
+    assert!(failure.because[0].contains("more than 1 A") && failure.next[0].contains("--current"), "{failure:?}");
+    assert!((1.0..2.0).contains(&excursion.peak_a), "{excursion:?}");
+    assert_eq!(values(&mut world, &drive, &WRITTEN), before);
+    assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+}
+
+/// Something else pushes the shaft this way and that from before the excitation grows: it is lost in that, and stopped before its end.
+#[test]
+fn a_measurement_whose_motion_no_longer_follows_is_stopped_on_its_way() {
+    let (mut world, drive) = wheel(&["load inertia 0.02"]).world().unwrap();
+    let before = values(&mut world, &drive, &WRITTEN);
+    let (request, restorer, mut excursion) = (request(), Restorer::of(&drive), Excursion::default());
+    let mut run = Box::pin(find((&drive, &restorer), &request, &mut excursion));
+    // Ten seconds of steady speeds after a second of boot, one small period; six whole ones of two seconds would end after 25 s.
+    assert!(sim::block_on_for(&mut world, Duration::from_millis(10_500), &mut run).is_err());
+    let (mut random, mut pushes) = (Prng::new(3), true);
+    let failure = loop {
+        if let Ok(found) = sim::block_on_for(&mut world, Duration::from_millis(3), &mut run) {
+            break found.unwrap_err();
+        }
+        // The excitation lies on 60 r/min: below this it comes to rest, which what pushes is not to hinder.
+        pushes &= world.report(1).unwrap().velocity_rpm > 3.0;
+        let torque_nm = if pushes { 5.0 - random.below(10_000) as f64 * 1e-3 } else { 0.0 };
+        world.apply(Place::node(1), &format!("load torque {torque_nm}").parse().unwrap()).unwrap().unwrap();
+    };
+    assert_eq!(failure.kind, "incoherent", "{failure:?}");
+    assert!(failure.because[0].contains("no longer follows") && world.now() < Instant::from_secs(23), "{failure:?}");
+    assert_eq!(values(&mut world, &drive, &WRITTEN), before);
+    assert!(world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+}
+
+/// The gain of the speed loop falls to one where that was asked for: on the plant too, which is measured again with what was proposed.
+#[test]
+fn a_bandwidth_that_was_asked_for_is_had_on_the_plant() {
+    let (mut world, drive) = wheel(&["load inertia 0.02", "load friction 0.2 viscous 0.01"]).world().unwrap();
+    let (model, motor) = (loops_of(&drive).unwrap(), motor_of(loops_of(&drive).unwrap().0).unwrap());
+    let (found, setup) = measured(&mut world, &drive, with_constant(&motor), Bounds::default()).unwrap();
+    let proposed = Proposed::of(&found, &setup, model, Objective::Bandwidth(12.0), false).unwrap();
+    assert!(relative(proposed.before.crossover_hz, 12.0) > 0.2, "{proposed:?}");
+    assert!(relative(proposed.after.crossover_hz, 12.0) < 0.1, "{proposed:?}");
+    let write = async {
+        setup.put_back(&drive).await.unwrap();
+        for gain in &proposed.gains {
+            drive.node().download(gain.object, &(gain.after as u16).to_le_bytes()).await.unwrap();
+        }
+    };
+    sim::block_on(&mut world, write).unwrap();
+    let again = identified(&mut world, &drive, &motor).unwrap();
+    let margins = tune::margins(&again.plant, &again.own, 500.0);
+    assert!(margins.is_stable && relative(margins.crossover_hz, 12.0) < 0.1, "{margins:?}");
+}
+
+/// A filter in the way of the current (201Ch, counts of 1 us; 100 as delivered) comes as late as its time constant.
+#[test]
+fn the_delay_of_the_loop_is_longer_by_what_is_put_into_it() {
+    let mut delays = [100_u16, 1100].map(|filter| {
+        let (mut world, drive) = wheel(&["load inertia 0.02", "load friction 0.2 viscous 0.01"]).world().unwrap();
+        let motor = motor_of(devices::model("zlac8030l").unwrap()).unwrap();
+        let filter = filter.to_le_bytes();
+        sim::block_on(&mut world, drive.node().download(Mux::new(0x201C, 0), &filter)).unwrap().unwrap();
+        identified(&mut world, &drive, &motor).unwrap().loop_delay_s() * 1e3
+    });
+    let [short, long] = &mut delays;
+    assert!((*long - *short - 1.0).abs() < 0.15, "{delays:?} ms");
 }
 
 #[test]
@@ -434,7 +379,8 @@ fn a_load_that_pushes_all_the_time_pushes_the_twin_too() {
     let (mut world, drive) = plant.world().unwrap();
     let model = devices::model("zlac8030l").unwrap();
     let motor = motor_of(model).unwrap();
-    let Measured { found, model, .. } = identified(&mut world, &drive, &motor).unwrap();
+    let found = identified(&mut world, &drive, &motor).unwrap();
+    let model = loops_of(&drive).unwrap();
     let load_a = found.friction.load_a;
     assert!(relative(load_a * motor.windings.torque_constant_nm_a(), 1.5) < 0.05, "{load_a}");
     let twin = Twin::new(model, &found, with_constant(&motor), Vec::new());

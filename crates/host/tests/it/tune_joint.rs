@@ -12,6 +12,7 @@ use sim::machine::TimingMode;
 use sim::{MotorData, Place, Prng, Stimulus};
 
 use crate::tune::{tried, with_constant};
+use crate::tune_random::{machines, moved, proposed};
 
 /// What the plant has at the motor's shaft: closed forms of its own equations (`plant::gear`).
 struct Truth {
@@ -80,17 +81,13 @@ fn swing(plant: &Twin, values: &[(Mux, i64)]) -> f64 {
     most - least
 }
 
-/// More with `FERRODRIVE_MACHINES=50`.
-fn machines() -> usize {
-    std::env::var("FERRODRIVE_MACHINES").ok().and_then(|text| text.parse().ok()).unwrap_or(2)
-}
-
 #[test]
 fn random_joints_are_identified_and_gains_proposed_for_them_are_stable_and_better() {
     let mut randoms = Prng::new(5);
     let names = ["m4230e17b50", "m4230e17b80", "m8025e25b50", "m8025e25b80"];
     let mut worse = Vec::new();
-    for number in 0..machines() {
+    let count = machines(2);
+    for number in 0..count {
         let (load, name) = (random(&mut randoms), names[number % 4]);
         let (plant, motor, _) = plant(name, &load);
         let report = found(&plant);
@@ -106,14 +103,7 @@ fn random_joints_are_identified_and_gains_proposed_for_them_are_stable_and_bette
         for gain in report.gains.iter().filter(|gain| gain.object != "60F9h:02") {
             assert_eq!(gain.before % 10, gain.after % 10, "{gain:?}");
         }
-        let after: Vec<(Mux, i64)> = report
-            .gains
-            .iter()
-            .map(|gain| {
-                let (index, sub) = gain.object.split_once("h:").unwrap();
-                (Mux::new(u16::from_str_radix(index, 16).unwrap(), sub.parse().unwrap()), gain.after)
-            })
-            .collect();
+        let after = proposed(&report);
         let how = (Duration::from_millis(1), Bounds { current_a: 30.0, speed_rpm: 600.0, ..Bounds::default() });
         let (old, new) = (tried(&plant, &[], how), tried(&plant, &after, how));
         for answer in [&new.step, &new.load] {
@@ -131,11 +121,15 @@ fn random_joints_are_identified_and_gains_proposed_for_them_are_stable_and_bette
         );
         // It would be seen: all that the gain can be, and the least time.
         assert!(wild_rpm > 1.25 * swing_rpm, "{number} {name}: {wild_rpm} and {swing_rpm} r/min");
+        // A move by the position loop, within 1 % and less than that beyond its end: at half of the speed for three quarters of a second.
+        let (end, way_deg) = (moved(&plant, &after, 600.0), 0.75 * 0.5 * 600.0 * 6.0);
+        assert!(end.settled_s.is_some() && end.overshoot_deg < 0.01 * way_deg, "{number} {name}: {end:?}");
         if new.error() > old.error() {
             worse.push(number);
         }
     }
-    assert!(worse.len() * 10 <= machines(), "worse than as delivered: {worse:?}");
+    println!("{count} joints: worse {worse:?}");
+    assert!(worse.len() * 10 <= count, "worse than as delivered: {worse:?}");
 }
 
 #[test]

@@ -11,6 +11,8 @@ use machine::file::Machine;
 use master::{Drive, Network};
 use sim::{Prng, World};
 
+use crate::tune_random::machines;
+
 /// What makers' sheets add to the profile: gains of two loops, a filter, an integral time and the current that the speed loop asks for.
 const OBJECTS: [(&str, u8, &str, i64); 6] = [
     ("Speed loop proportional gain", 6, "rw", 500),
@@ -46,9 +48,13 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn machine(name: &str, loops: &str, load: [f64; 3]) -> Machine {
+    machine_with(name, loops, load, "")
+}
+
+fn machine_with(name: &str, loops: &str, load: [f64; 3], more: &str) -> Machine {
     let [inertia, dry, viscous] = load;
     let text = format!(
-        "[[drive]]\nmodel = 'maker.eds'\nnode = 5\nload = {{ inertia_kg_m2 = {inertia}, friction = {{ coulomb_nm = {dry}, viscous_nm_s = {viscous} }} }}\n\
+        "[[drive]]\nmodel = 'maker.eds'\nnode = 5\nload = {{ inertia_kg_m2 = {inertia}, friction = {{ coulomb_nm = {dry}, viscous_nm_s = {viscous} }}{more} }}\n\
          [drive.loops]\n{loops}"
     );
     Machine::parse_in(&text, &folder(name)).unwrap_or_else(|bad| panic!("{bad}"))
@@ -86,18 +92,14 @@ const TIME_AND_FILTER: &str = "speed_proportional = '2100:01'\nspeed_integral_ti
      position_proportional = { object = '2100:04', per_count = 0.1 }\n\
      demand = { object = '2100:06', per_count = 1e-3 }\n";
 
-/// More with `FERRODRIVE_MACHINES=50`.
-fn machines() -> usize {
-    std::env::var("FERRODRIVE_MACHINES").ok().and_then(|text| text.parse().ok()).unwrap_or(2)
-}
-
 /// Inertia within 5 %, friction within 10 %: closed forms of the plant's own equations.
 #[test]
 fn random_servos_are_identified_by_the_objects_that_a_file_names_and_get_better_gains() {
     let motor = motor_of(&CIA402).unwrap();
     let mut random = Prng::new(7);
     let mut worse = Vec::new();
-    for number in 0..machines() {
+    let count = machines(2);
+    for number in 0..count {
         let mut between =
             |low: f64, high: f64| low * (high / low).powf(random.below(1 << 20) as f64 / f64::from(1 << 20));
         let load @ [inertia, dry, viscous] = [between(2e-5, 4e-4), between(0.02, 0.15), between(2e-4, 2e-3)];
@@ -120,7 +122,31 @@ fn random_servos_are_identified_by_the_objects_that_a_file_names_and_get_better_
             worse.push(number);
         }
     }
-    assert!(worse.len() * 10 <= machines(), "worse than as delivered: {worse:?}");
+    println!("{count} servos: worse {worse:?}");
+    assert!(worse.len() * 10 <= count, "worse than as delivered: {worse:?}");
+}
+
+/// A load behind a spring: its resonance within 2 %, by the closed form of two masses.
+#[test]
+fn the_resonance_of_a_servo_with_an_elastic_load_is_found() {
+    let motor = motor_of(&CIA402).unwrap();
+    let (inertia, resonance_hz) = (3e-4, 40.0);
+    // The output wheel of a load's gear.
+    let load = inertia + 0.01 * motor.rotor.inertia_kg_m2;
+    let reduced = 1.0 / (1.0 / load + 1.0 / motor.rotor.inertia_kg_m2);
+    let stiffness = (std::f64::consts::TAU * resonance_hz).powi(2) * reduced;
+    let gear = format!(", gear = {{ ratio = 1, backlash_deg = 0, stiffness_nm_rad = {stiffness} }}");
+    let (mut world, drive) = booted(&machine_with("elastic", GAINS, [inertia, 0.05, 5e-4], &gear));
+    let (bounds, constant) = (request(&drive).bounds, 1270.0 / 2800.0);
+    let (found, setup) = crate::tune::measured(&mut world, &drive, (&motor, constant), bounds).unwrap();
+    sim::block_on(&mut world, setup.put_back(&drive)).unwrap().unwrap();
+    let elastic = found.mechanics.elastic.unwrap();
+    let (resonance, anti) = (elastic.resonance_hz, elastic.anti_resonance_hz);
+    assert!((resonance / resonance_hz - 1.0).abs() < 0.02, "{found:?}");
+    let anti_hz = (stiffness / load).sqrt() / std::f64::consts::TAU;
+    assert!((anti / anti_hz - 1.0).abs() < 0.05, "{anti} Hz, the plant has {anti_hz}");
+    let whole = load + motor.rotor.inertia_kg_m2;
+    assert!((found.inertia_kg_m2() / whole - 1.0).abs() < 0.05, "{} of {whole}", found.inertia_kg_m2());
 }
 
 /// The drive itself, which is not its twin: with the gains that it has and with those that are proposed.

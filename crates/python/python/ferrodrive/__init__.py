@@ -25,6 +25,7 @@ Quantities have their units in their names: ``velocity_rpm``, ``current_a``, ``s
 from ._native import __version__, eds, models, stimulus_forms
 from .axes import AsyncBase, AsyncGroup, Axis, Base, Group
 from .body import Body
+from .captures import load_capture, save_capture, tune_capture
 from .control import Control
 from .errors import (
     Aborted,
@@ -88,9 +89,12 @@ __all__ = [
     "__version__",
     "check",
     "eds",
+    "load_capture",
     "models",
     "run",
+    "save_capture",
     "stimulus_forms",
     "sweep_table",
+    "tune_capture",
     "virtual_time",
 ]

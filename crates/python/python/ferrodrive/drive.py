@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import os
-from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _native
 from ._native import Job, model_name
+from .captures import captured
 from .errors import MasterError
 from .reports import Capture, DriveState, MotionReport, RampTuning, TestMotionRun, Tuning
 from .words import number
@@ -84,26 +83,7 @@ def _given(do_: str, name: str, value: Any) -> Any:
 
 
 def _runs(report: dict[str, Any]) -> list[TestMotionRun]:
-    return [{**run, "capture": _captured(run["capture"])} for run in report["runs"]]  # type: ignore[typeddict-item]
-
-
-def _captured(report: dict[str, Any]) -> Capture:
-    """The lists of a capture as arrays, which numpy takes without a copy."""
-    traces = report["traces"]
-    return {
-        "model": report["model"],
-        "trigger_s": report["trigger_s"],
-        "time_s": array("d", report["time_s"]),
-        "values": {
-            trace["quantity"]: array("d", (math.nan if value is None else value for value in trace["values"])) for trace in traces
-        },
-        "units": {trace["quantity"]: trace["unit"] for trace in traces},
-        "by": {trace["quantity"]: trace["by"] for trace in traces},
-        "period_s": {trace["quantity"]: trace["period_s"] for trace in traces},
-        "jitter_s": {trace["quantity"]: trace["jitter_s"] for trace in traces},
-        "gaps": {trace["quantity"]: trace["gaps"] for trace in traces},
-        "parameters": {name: bytes(value) for name, value in report["objects"]},
-    }
+    return [{**run, "capture": captured(run["capture"])} for run in report["runs"]]  # type: ignore[typeddict-item]
 
 
 @contextmanager
@@ -363,8 +343,8 @@ class Drive(_Orders):
         0.002
         """
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        with _reported_as(_captured):
-            return _captured(self.network._finish(self._capture(quantities, take, journal, **order)))
+        with _reported_as(captured):
+            return captured(self.network._finish(self._capture(quantities, take, journal, **order)))
 
     def test_motion(
         self,
@@ -624,8 +604,8 @@ class AsyncDrive(_Orders):
     ) -> Capture:
         """As :meth:`Drive.capture`."""
         order = {"duration": duration, "period": period, "trigger": trigger, "pre_trigger": pre_trigger, "sdo": sdo}
-        with _reported_as(_captured):
-            return _captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
+        with _reported_as(captured):
+            return captured(await self.network._finish_soon(self._capture(quantities, take, journal, **order)))
 
     async def test_motion(
         self,

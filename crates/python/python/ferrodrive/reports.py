@@ -48,6 +48,9 @@ class Capture(TypedDict):
     reading belongs to a time), its unit, the TPDO that it came by or ``SDO``, the period that was had, its largest deviation, and how often
     readings are missing. ``parameters`` are those of the drive as they were, by object, in the order of the wire."""
 
+    name: str
+    notes: str
+    node: int
     model: str
     trigger_s: Optional[float]
     time_s: array[float]
@@ -74,7 +77,7 @@ class TestMotionRun(TypedDict):
 
 class Tuning(TypedDict):
     """Of :meth:`Drive.tune`, as ``docs/json.md`` has it: what was found, the gains that are proposed, their margins, and the errors on the
-    twin and on the drive, before and after."""
+    twin and on the drive, before and after; the frequency response with its coherence."""
 
     node: int
     model: str
@@ -98,9 +101,35 @@ class Tuning(TypedDict):
     after: dict[str, Any]
     position: Optional[dict[str, Any]]
     twin_error: list[float]
+    twin_move: Optional[list[dict[str, Optional[float]]]]
     drive_error: Optional[list[float]]
     applied: bool
     notes: list[str]
+    response: list[dict[str, Any]]
+
+
+class CaptureTuning(TypedDict):
+    """Of :func:`tune_capture`, as ``docs/json.md`` has it: what was used, what was found of the mechanics and the speed loop, and the
+    frequency response with its coherence."""
+
+    node: int
+    rows: int
+    period_s: float
+    quantities: list[str]
+    coherent: int
+    frequencies: int
+    gain_rad_s2_a: float
+    viscous_per_s: float
+    inertia_kg_m2: Optional[float]
+    viscous_friction_nm_s: Optional[float]
+    anti_resonance_hz: Optional[float]
+    resonance_hz: Optional[float]
+    delay_ms: float
+    model_off: float
+    proportional_a_s_rad: Optional[float]
+    integral_a_rad: Optional[float]
+    notes: list[str]
+    response: list[dict[str, Any]]
 
 
 class RampTuning(TypedDict):
@@ -300,6 +329,7 @@ class NodeReport(TypedDict):
     remembered: Optional[list[dict[str, Any]]]
     remembered_not_known: Optional[str]
     captures: list[dict[str, Any]]
+    tunings: list[dict[str, Any]]
 
 
 class _CheckReport(TypedDict):

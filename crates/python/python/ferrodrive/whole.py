@@ -3,6 +3,7 @@ drive does not move, and the report about a node."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
@@ -12,7 +13,7 @@ from . import _native
 from ._native import Job
 from ._native import Network as NativeNetwork
 from .parameters import File
-from .reports import BootReport, CheckReport, ExplainReport, NodeReport, PlanReport, ScanReport
+from .reports import BootReport, CheckReport, ExplainReport, NodeReport, PlanReport, ScanReport, Tuning
 from .supervisor import path_of
 
 
@@ -199,6 +200,7 @@ class Whole:
         *,
         by: Optional[str] = None,
         captures: Sequence[File] = (),
+        tunings: Sequence[Tuning] = (),
         force: bool = False,
     ) -> NodeReport:
         """Writes a page about a node that prints well: identity, what differs from delivery, limits, guard, faults, PDOs, captures. What
@@ -208,6 +210,7 @@ class Whole:
         :param model: as for :meth:`drive`
         :param by: who makes it
         :param captures: records (MCAP, CSV) whose curves and figures of this node belong to it
+        :param tunings: what :meth:`Drive.tune` of this node has returned: gains and margins, before and after
         :param force: overwrite an existing file
         :raises FileExistsError: the file is there, without ``force``
         :raises MasterError: the node is silent, or its model is not known; a record is not one of this node
@@ -216,7 +219,7 @@ class Whole:
         True
         """
         page = _new_page(path, force)
-        return _kept(page, force, self._finish(self._report(node, model, by, captures)))
+        return _kept(page, force, self._finish(self._report(node, model, by, captures, tunings)))
 
     async def async_report(
         self,
@@ -226,15 +229,19 @@ class Whole:
         *,
         by: Optional[str] = None,
         captures: Sequence[File] = (),
+        tunings: Sequence[Tuning] = (),
         force: bool = False,
     ) -> NodeReport:
         """As :meth:`report`."""
         page = _new_page(path, force)
-        return _kept(page, force, await self._finish_soon(self._report(node, model, by, captures)))
+        return _kept(page, force, await self._finish_soon(self._report(node, model, by, captures, tunings)))
 
-    def _report(self, node: int, model: Optional[str], by: Optional[str], captures: Sequence[File]) -> Job:
+    def _report(
+        self, node: int, model: Optional[str], by: Optional[str], captures: Sequence[File], tunings: Sequence[Tuning]
+    ) -> Job:
         at = datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
-        return _native.report(self._native, node, model, (at, by, self._bus), [os.fspath(path) for path in captures])
+        files, texts = [os.fspath(path) for path in captures], [json.dumps(tuning) for tuning in tunings]
+        return _native.report(self._native, node, model, (at, by, self._bus), files, texts)
 
 
 def _new_page(path: File, force: bool) -> str:

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use host::network::report::{Capture, Made, NodeReport};
+use host::network::report::{Capture, Made, NodeReport, Tuning};
 use pyo3::prelude::*;
 use recording::{Kind, read};
 use words::document::read_bytes;
@@ -24,15 +24,18 @@ pub(crate) fn report(
     model: Option<&str>,
     made: (String, Option<String>, String),
     captures: Vec<PathBuf>,
+    tunings: Vec<String>,
 ) -> PyResult<Job> {
     let (at, by, bus) = made;
     let asked = AskedDrive::of(network.get(), node, model)?;
     network.get().begin_said(py, async move {
         let of_records: Result<Vec<_>, _> = captures.iter().map(|path| capture(path, &asked)).collect();
         let of_records = of_records?;
+        let tunings: Result<Vec<_>, _> = tunings.iter().map(|text| tuning(text, &asked)).collect();
+        let tunings = tunings?;
         let drive = asked.drive().await?;
         let mut report = NodeReport::read(&(), &drive, Made { at, by, bus }).await?;
-        report.captures = of_records;
+        (report.captures, report.tunings) = (of_records, tunings);
         Ok(Value::List(vec![Value::report(&report), Value::Text(report.to_html())]))
     })
 }
@@ -48,4 +51,13 @@ fn capture(path: &Path, asked: &AskedDrive) -> Result<Capture, Failure> {
     let kind = Kind::of_name(&name).ok_or_else(|| refused("its name ends in neither .mcap nor .csv".to_owned()))?;
     let recorded = read_bytes(path, LARGEST).and_then(|bytes| read(kind, &bytes)).map_err(refused)?;
     Capture::of_record(name, recorded, asked.node).map_err(refused)
+}
+
+/// What a tuning of the node has given.
+fn tuning(text: &str, asked: &AskedDrive) -> Result<Tuning, Failure> {
+    Tuning::of_json(text, asked.node).map_err(|reason| {
+        Failure::bad_file(format!("a tuning is not one of node {}", asked.node))
+            .because(reason)
+            .next("give what Drive.tune of this node has returned")
+    })
 }

@@ -169,6 +169,16 @@ mod tests {
         assert_eq!((&of_mcap["columns"], &of_mcap["marks"]), (&values["columns"], &values["marks"]));
     }
 
+    #[test]
+    fn a_record_has_the_same_values_in_both_of_its_forms() {
+        let csv = b"t_s,4.velocity_rpm,4.current_a,mark\n0.5,60,1.5,\n1,,2.5,over-voltage\n1.5,61,-1,\n";
+        let mcap = mcap_of_csv(csv).expect("it is written");
+        let [of_csv, of_mcap] = [("a.csv", &csv[..]), ("a.mcap", &mcap)].map(|(name, bytes)| loaded(name, bytes));
+        let (of_csv, of_mcap) = (of_csv.expect("a record"), of_mcap.expect("a record"));
+        assert_eq!(of_mcap["columns"], of_csv["columns"]);
+        assert_eq!((&of_mcap["marks"][0]["text"], &of_mcap["remark"]), (&"over-voltage".into(), &"".into()));
+    }
+
     /// CiA 301, 7.2.4.3: an expedited upload of 4 bytes is answered by 43h.
     #[test]
     fn a_log_is_the_objects_that_it_carries_in_any_form() {

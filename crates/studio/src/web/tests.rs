@@ -287,6 +287,39 @@ async fn half_a_header_has_five_seconds() {
     assert!(ended.is_ok() && rest.is_empty(), "it did not come: {ended:?}");
 }
 
+/// As the command line reads them.
+#[tokio::test]
+async fn the_trace_is_saved_with_the_same_frames_in_each_form() {
+    let (app, access, inbox) = server(None);
+    let bearer = format!("Bearer {}", token(&access));
+    let headers = [("authorization", bearer.as_str())];
+    let sent = ["704#05", "604#4041600000000000", "584#4B41600050020000"];
+    for (at, text) in sent.iter().enumerate() {
+        let at = can::Instant::from_millis(at as u64);
+        inbox.trace.append(BusFrame { at, frame: text.parse().expect("a frame"), own: false });
+    }
+    for (ending, format) in [
+        ("log", canlog::Format::Candump),
+        ("asc", canlog::Format::Asc),
+        ("blf", canlog::Format::Blf),
+        ("pcapng", canlog::Format::Pcapng),
+    ] {
+        let saved = ask(&app, "GET", &format!("/api/trace.{ending}"), &headers, "").await;
+        assert_eq!(saved.status(), StatusCode::OK, "{ending}");
+        let bytes = axum::body::to_bytes(saved.into_body(), 1 << 20).await.expect("it ends");
+        let entries = canlog::LogReader::new(&bytes[..], format).map(|entry| entry.expect("it is read"));
+        let frames: Vec<String> = entries
+            .filter_map(|entry| match entry {
+                canlog::Entry::Record(canlog::Record { content: canlog::Content::Frame(frame), .. }) => {
+                    Some(frame.to_string())
+                }
+                _ => None,
+            })
+            .collect();
+        assert_eq!(frames, sent, "{ending}");
+    }
+}
+
 #[tokio::test]
 async fn the_trace_is_asked_for_in_parts_and_saved_by_few_at_a_time() {
     let (app, access, inbox) = server(None);

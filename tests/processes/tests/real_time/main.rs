@@ -1,5 +1,6 @@
 //! Processes of `ferrodrive` in real time: servers, signals, sockets, terminals. One program: a file each.
 
+mod capture;
 mod control_strangers;
 mod gateway;
 mod group;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use canopen::NodeId;
 use host::network::params::journal::default_path;
-use host::tune::{Bounds, CaptureReport, RampReport, RampRequest, Request, TuneReport};
+use host::tune::{Bounds, CaptureReport, MoveRow, RampReport, RampRequest, Request, TuneReport};
 use master::units::{Amperes, Angle, Rpm, parse_duration};
 use recording::Capture;
 use sim::Place;
@@ -87,8 +87,8 @@ pub(crate) struct Tune {
     torque_constant: Option<f64>,
     /// Say what this record of the drive shows; nothing moves
     ///
-    /// Of `capture`, `record`, another instrument, or a log of frames: frequency response with coherence, masses and speed loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or
-    /// velocity_rpm. No gains are proposed.
+    /// Of `capture`, `test-motion` or another instrument, NAME.mcap or NAME.csv: frequency response with coherence, masses and speed
+    /// loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or velocity_rpm. No gains are proposed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["apply", "bandwidth"])]
     capture: Option<PathBuf>,
     /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
@@ -211,8 +211,12 @@ impl Tune {
                 .because(reason)
         };
         let recorded = read_record(path, context.decoder())?;
+        let known = context.models.get(&self.node).map(|stated| stated.description().name);
         let capture = Capture::of(&recorded, Some(Place::node(self.node.raw()))).map_err(unread)?;
-        let report = host::tune::of_capture(&capture, self.torque_constant)?;
+        let mut report = host::tune::of_capture(&capture, self.torque_constant)?;
+        if let Some(model) = known.filter(|model| !capture.model.is_empty() && capture.model != *model) {
+            report.notes.push(format!("it was captured of a {}, and node {} is a {model}", capture.model, self.node));
+        }
         self.draw(&report.picture)?;
         Ok(report)
     }
@@ -353,6 +357,15 @@ fn three_digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A move on the twin, before and after.
+fn moves([before, after]: &[MoveRow; 2]) -> String {
+    let text = |row: &MoveRow| {
+        let settled = row.settled_s.map_or("does not settle".to_owned(), |at| format!("settled after {at:.2} s"));
+        format!("{:.1} degrees beyond its end, {settled}", row.overshoot_deg)
+    };
+    format!("a move on the twin: {} before; {} after", text(before), text(after))
+}
+
 impl Report for TuneReport {
     fn text(&self, paint: Paint) -> String {
         let is_measured = self.frequencies > 0;
@@ -403,6 +416,7 @@ impl Report for TuneReport {
         lines.push(margins("speed loop, as it is ", &self.before));
         lines.push(margins("speed loop, proposed ", &self.after));
         lines.extend(self.position.iter().map(|row| margins("position loop around it", row)));
+        lines.extend(self.twin_move.iter().map(moves));
         let error = |[before, after]: [f64; 2]| format!("{before:.2} r/min s before, {after:.2} after");
         lines.push(format!("error after a step and a load, on the twin: {}", error(self.twin_error)));
         if let Some(errors) = self.drive_error {

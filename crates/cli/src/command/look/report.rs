@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
-use host::network::report::{Capture, Made, NodeReport};
+use host::network::report::{Capture, Made, NodeReport, Tuning};
 use master::decode::Decoder;
 use serde::Serialize;
 use transport::WallClock;
 use words::counted;
+use words::document::read_bytes;
 use words::node::node;
 
 use crate::command::configure::dcf::{keep, new_file};
@@ -18,13 +19,16 @@ use crate::failure::Failure;
 use crate::frames::stamp::absolute;
 use plot::Paint;
 
+/// The largest file of a tuning that is read: some tens of thousands of bytes are usual.
+const LARGEST_TUNING: u64 = 16 << 20;
+
 /// Write a report on a node: identity, differences from delivery, limits, faults, PDOs
 ///
 /// The report is one page of HTML that needs nothing else, and prints on A4. The node is only read: nothing is written to
 /// it, and it is not moved.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive report 4 -o wheel.html --by 'A. Fitter'\n  \
-    ferrodrive --bus can0 report 4 -o wheel.html --capture run.mcap")]
+    ferrodrive --bus can0 report 4 -o wheel.html --capture run.mcap --tune tune.json")]
 pub(crate) struct Report {
     /// Node-ID
     #[arg(value_parser = node)]
@@ -38,6 +42,9 @@ pub(crate) struct Report {
     /// Record of --record, `record` or `capture`, or a log of frames (candump, BLF, ..), whose curves and figures of this node belong to the report; may be repeated
     #[arg(long, value_name = "FILE")]
     capture: Vec<PathBuf>,
+    /// What `tune NODE --json` has printed, whose gains and margins before and after belong to the report; may be repeated
+    #[arg(long, value_name = "FILE.json")]
+    tune: Vec<PathBuf>,
     /// Overwrite an existing file
     #[arg(long)]
     force: bool,
@@ -69,6 +76,7 @@ impl Report {
             .iter()
             .map(|path| capture(path, self.node, context.decoder()))
             .collect::<Result<Vec<_>, _>>()?;
+        let tunings = self.tune.iter().map(|path| tuning(path, self.node)).collect::<Result<Vec<_>, _>>()?;
         let clock = WallClock::start();
         let now = clock.unix_zero() + Duration::from_nanos(clock.now().as_nanos());
         // To the minute.
@@ -76,7 +84,7 @@ impl Report {
         let made = Made { at, by: self.by.clone(), bus: context.bus().to_string() };
         let drive = context.known_drive(self.node).await?;
         let mut report = NodeReport::read(&context.progress, &drive, made).await?;
-        report.captures = captures;
+        (report.captures, report.tunings) = (captures, tunings);
         keep(&self.output, report.to_html().as_bytes(), self.force)?;
         Ok(Written { file: self.output.display().to_string(), report })
     }
@@ -90,6 +98,16 @@ fn capture(path: &Path, node: NodeId, decoder: Decoder) -> Result<Capture, Failu
         Failure::bad_file(format!("the record {} has nothing of node {node}", path.display()))
             .because(reason)
             .next("give a record of this node, or omit it")
+    })
+}
+
+/// What a tuning of a node has printed.
+fn tuning(path: &Path, node: NodeId) -> Result<Tuning, Failure> {
+    let text = read_bytes(path, LARGEST_TUNING).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    text.and_then(|text| Tuning::of_json(&text, node)).map_err(|reason| {
+        Failure::bad_file(format!("{} is not a tuning of node {node}", path.display()))
+            .because(reason)
+            .next(format!("make one: ferrodrive --json tune {node} > tune.json; or omit it"))
     })
 }
 

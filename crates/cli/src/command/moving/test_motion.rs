@@ -6,8 +6,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use host::capture::Wanted;
-use host::capture::merit::{self, Heating};
-use host::test_motion::{Figures, Followed, Motion, Order, Run, ShapeName, limits, run, usual_quantities};
+use host::test_motion::{Figures, Motion, Order, Run, ShapeName, limits, run, usual_quantities};
 use machine::group_move::{angle, rate, turning, turns_of};
 use master::Drive;
 use master::units::{Angle, Rpm, parse_duration};
@@ -110,6 +109,8 @@ pub(crate) struct TestMotionReport {
     limits: AxisLimitValues,
     guard: GuardReport,
     runs: Vec<RunRow>,
+    /// What else is to be known.
+    notes: Vec<String>,
 }
 
 /// One run.
@@ -127,7 +128,11 @@ impl TestMotion {
         let drive = context.known_drive(self.node).await?;
         let following = turns_of(&drive, self.following_error).await?.0.abs();
         let limits = limits(self.velocity, self.acceleration, following)?;
-        let motion = self.motion(&drive).await?;
+        let (path, notes) = match self.shape {
+            ShapeName::Path => self.recorded(&drive)?,
+            _ => Default::default(),
+        };
+        let motion = self.motion(&drive, path).await?;
         let names = match self.capture.is_empty() {
             true => usual_quantities(&drive).await?,
             false => self.capture.clone(),
@@ -146,7 +151,7 @@ impl TestMotion {
             ShapeName::Steps => AxisLimitValues::of_ramps(&limits, self.acceleration.map(|rate| rate * 60.0)),
             _ => (&limits).into(),
         };
-        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name().to_owned(), limits, guard, runs })
+        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name().to_owned(), limits, guard, runs, notes })
     }
 
     const fn shape_name(&self) -> &'static str {
@@ -154,7 +159,7 @@ impl TestMotion {
     }
 
     /// What a run sends.
-    async fn motion(&self, drive: &Drive) -> Result<Motion, Failure> {
+    async fn motion(&self, drive: &Drive, path: Vec<(f64, f64)>) -> Result<Motion, Failure> {
         let degrees = |turns: f64| turns * 360.0;
         let order = Order {
             shape: self.shape,
@@ -164,7 +169,7 @@ impl TestMotion {
             to_frequency_hz: self.to_frequency,
             periods: self.periods,
             time_s: self.time.as_secs_f64(),
-            path: if self.shape == ShapeName::Path { self.recorded()? } else { Vec::new() },
+            path,
             count: self.count,
             velocity_rpm: self.velocity.0,
             acceleration_rpm_s: self.acceleration.map(|rate| rate * 60.0),
@@ -182,8 +187,8 @@ impl TestMotion {
         })
     }
 
-    /// The position of a capture, in degrees.
-    fn recorded(&self) -> Result<Vec<(f64, f64)>, Failure> {
+    /// The position of a capture, in degrees, and whether it is of another drive: its way is that of an output all the same.
+    fn recorded(&self, drive: &Drive) -> Result<(Vec<(f64, f64)>, Vec<String>), Failure> {
         let path = self
             .path
             .as_deref()
@@ -194,7 +199,14 @@ impl TestMotion {
         };
         let capture = read(path).map_err(unusable)?;
         let trace = capture.trace("position_deg").ok_or_else(|| unusable("it has no position_deg".to_owned()))?;
-        Ok(capture.points(trace).collect())
+        let model = drive.description().map_or("", |model| model.name);
+        let other = capture.place.node != self.node.raw() || !capture.model.is_empty() && capture.model != model;
+        let of = if capture.model.is_empty() { String::new() } else { format!(" ({})", capture.model) };
+        let note = format!(
+            "the path was captured of node {}{of}, and node {} ({model}) is moved along it",
+            capture.place, self.node
+        );
+        Ok((capture.points(trace).collect(), other.then_some(note).into_iter().collect()))
     }
 
     /// Sets the capture up, makes the runs, and puts everything back; what moves is at rest at its end. Files are written then: a group has
@@ -264,13 +276,13 @@ fn read(path: &Path) -> Result<Capture, String> {
 
 impl Report for TestMotionReport {
     fn text(&self, paint: Paint) -> String {
-        let Self { node, shape, limits, guard, runs } = self;
+        let Self { node, shape, limits, guard, runs, notes } = self;
         let mut lines = vec![format!("node {node}: {shape}, {}", words::counted(runs.len(), "run"))];
         lines.push(format!("  limits  {}", limits.text()));
         lines.push(format!("  guard   {}", guard.text));
         let mut table = Table::new(&["run", "what", "figure", "+-"]);
         for row in runs {
-            for (what, figure, grid) in row.figures() {
+            for [what, figure, grid] in row.figures.rows() {
                 table.row([row.run.to_string(), what, figure, grid]);
             }
         }
@@ -279,38 +291,7 @@ impl Report for TestMotionReport {
             runs.iter().filter_map(|row| row.figures.no_steps.as_ref().map(|why| format!("run {}: {why}", row.run))),
         );
         lines.extend(runs.iter().map(|row| row.capture.text(paint)));
+        lines.extend(notes.iter().map(|note| format!("note: {note}")));
         lines.join("\n")
-    }
-}
-
-impl RunRow {
-    /// What, how much, and how exactly.
-    fn figures(&self) -> Vec<(String, String, String)> {
-        let mut figures = Vec::new();
-        let mut add = |what: String, value: String, grid: String| figures.push((what, value, grid));
-        if let Some(Followed { took_s, most_deg, rms_deg }) = self.figures.followed {
-            add("following error".into(), format!("{most_deg:.3} deg at most, {rms_deg:.3} deg r.m.s."), String::new());
-            add("time".into(), format!("{took_s:.3} s"), String::new());
-        }
-        for step in &self.figures.steps {
-            let of = format!("{} to {} r/min", step.from, step.to);
-            for (what, figure, unit, times) in [
-                ("rise", &step.rise_s, "ms", 1e3),
-                ("overshoot", &step.overshoot, "%", 100.0),
-                ("settling", &step.settling_s, "ms", 1e3),
-            ] {
-                let (value, grid) = match figure {
-                    merit::Figure::Is { value, grid } => {
-                        (format!("{:.1} {unit}", value * times), format!("{:.1} {unit}", grid * times))
-                    }
-                    merit::Figure::Unknown { why } => (why.clone(), String::new()),
-                };
-                add(format!("{what}, {of}"), value, grid);
-            }
-        }
-        if let Some(Heating { rms_a, a2s }) = self.figures.heating {
-            add("current".into(), format!("{rms_a:.3} A r.m.s., {a2s:.3} A²·s"), String::new());
-        }
-        figures
     }
 }

@@ -7,7 +7,7 @@ use can::Instant;
 use canlog::{Content, Entry, Record};
 use host::capture::record_of_log;
 use master::decode::Decoder;
-use recording::{Kind, Recorded, picture, read};
+use recording::{Capture, Kind, Recorded, overlay, read};
 use serde::Serialize;
 use words::counted;
 use words::document::read_bytes;
@@ -28,16 +28,23 @@ use plot::Paint;
 #[command(after_help = "Examples:\n  \
     ferrodrive plot run.mcap -o run.svg\n  \
     ferrodrive plot trace.blf --machine base.toml\n  \
-    ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html")]
+    ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html\n  \
+    ferrodrive plot before.mcap after.mcap --align trigger -o both.html")]
 pub(crate) struct Plot {
     /// Record, NAME.mcap or NAME.csv; or a log of frames (candump, BLF, ..), whose PDOs are decoded by --model or --machine
-    file: PathBuf,
+    ///
+    /// Several are laid over each other.
+    #[arg(value_name = "FILE", required = true)]
+    records: Vec<PathBuf>,
+    /// What several have in common at 0 s
+    #[arg(long, value_enum, default_value = "begin")]
+    align: Align,
     /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
     signals: Vec<String>,
-    /// Start, e.g. 500ms (a bare number is s)
-    #[arg(long, value_name = "TIME", default_value = "0s", value_parser = seconds)]
-    from: f64,
+    /// Start, e.g. 500ms (a bare number is s; default: that of the record)
+    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    from: Option<f64>,
     /// End (default: that of the record)
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     to: Option<f64>,
@@ -45,6 +52,15 @@ pub(crate) struct Plot {
     /// the record)
     #[arg(long, short, alias = "svg", alias = "html", value_name = "FILE", value_parser = picture_path)]
     output: Vec<PathBuf>,
+}
+
+/// What is at 0 s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Align {
+    /// Where each record begins
+    Begin,
+    /// The trigger of each capture
+    Trigger,
 }
 
 fn picture_path(text: &str) -> Result<PathBuf, String> {
@@ -76,6 +92,8 @@ fn seconds(text: &str) -> Result<f64, String> {
 #[derive(Debug, Serialize)]
 pub(crate) struct Drawn {
     record: PathBuf,
+    /// All that lie over each other, that one first.
+    records: Vec<PathBuf>,
     /// How many signals and marks are in the picture.
     signals: usize,
     marks: usize,
@@ -89,21 +107,33 @@ pub(crate) struct Drawn {
 impl Plot {
     /// Draws it.
     pub(crate) fn draw(&self, global: &Global) -> Result<Drawn, Failure> {
-        let recorded = read_record(&self.file, decoder(global, &[]))?;
-        let title = self.file.file_name().unwrap_or_default().to_string_lossy();
-        let span = self.from..=self.to.unwrap_or(f64::INFINITY);
+        let span = self.from.unwrap_or(f64::NEG_INFINITY)..=self.to.unwrap_or(f64::INFINITY);
         if span.is_empty() {
             return Err(Failure::usage("--to is before --from").next("give a later --to, or omit it"));
         }
-        let poster = picture(&title, &recorded, &self.signals, span).map_err(|reason| {
-            Failure::new(format!("cannot draw {}", self.file.display()))
+        let mut records = Vec::new();
+        for path in &self.records {
+            let recorded = read_record(path, decoder(global, &[]))?;
+            records.push((
+                name_of(path),
+                if self.align == Align::Trigger { triggered(path, recorded)? } else { recorded },
+            ));
+        }
+        let named: Vec<_> = match records.as_slice() {
+            [(_, only)] => vec![("", only)],
+            all => all.iter().map(|(name, recorded)| (name.as_str(), recorded)).collect(),
+        };
+        let first = self.records.first().cloned().unwrap_or_default();
+        let title = records.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        let poster = overlay(&title, &named, &self.signals, span).map_err(|reason| {
+            Failure::new(format!("cannot draw {title}"))
                 .of_kind("record")
                 .because(reason)
                 .next("omit --signals, --from and --to to draw everything that can be plotted")
         })?;
         let mut files = self.output.clone();
         if files.is_empty() {
-            files.push(self.file.with_extension("svg"));
+            files.push(first.with_extension("svg"));
         }
         let with_stdout = files.len();
         files.retain(|path| !is_stdout(path));
@@ -117,8 +147,28 @@ impl Plot {
         let figures = || poster.rows.iter().flatten();
         let signals = figures().flat_map(|figure| &figure.panels).map(|panel| panel.traces.len()).sum();
         let marks = figures().map(|figure| figure.events.len()).max().unwrap_or(0);
-        Ok(Drawn { record: self.file.clone(), signals, marks, torn: recorded.torn, files, picture })
+        let torn = records.iter().any(|(_, recorded)| recorded.torn);
+        Ok(Drawn { record: first, records: self.records.clone(), signals, marks, torn, files, picture })
     }
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A capture with its trigger at 0 s.
+fn triggered(path: &Path, mut recorded: Recorded) -> Result<Recorded, Failure> {
+    let place = Capture::places(&recorded).first().copied();
+    let trigger_s = Capture::of(&recorded, place).ok().and_then(|capture| capture.trigger_s);
+    let at = trigger_s.ok_or_else(|| {
+        Failure::bad_file(format!("{} has no trigger", path.display()))
+            .because("it was not captured with --trigger")
+            .next("lay them over each other from their begin: --align begin")
+    })?;
+    recorded.series.iter_mut().flat_map(|series| &mut series.points).for_each(|point| point.0 -= at);
+    // What happened has no time before 0.
+    recorded.marks.clear();
+    Ok(recorded)
 }
 
 /// What a file that --record has written holds, or what the PDOs of a log carry, which this decoder puts into words.

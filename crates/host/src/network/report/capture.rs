@@ -5,6 +5,7 @@ use plot::Figure;
 use recording::{Recorded, Subject, picture};
 
 use super::{Capture, CaptureFigure};
+use crate::test_motion::Figures;
 
 impl Capture {
     /// What a record has of a node; `file` is its name.
@@ -15,6 +16,9 @@ impl Capture {
         let Recorded { mut series, marks, torn } = recorded;
         series.retain(|series| matches!(series.column.subject, Subject::Axis(place) if place.node == node.raw()));
         let recorded = Recorded { series, marks, torn };
+        // A node with several axes has as many motions.
+        let capture = recording::Capture::of(&recorded, None).ok();
+        let merit = capture.map(|capture| Figures::of(None, &capture)).filter(Figures::are_some);
         let poster = picture(&file, &recorded, &[], 0.0..=f64::INFINITY)?;
         let drawn: Vec<&Figure> = poster.rows.iter().flatten().collect();
         // A node with several axes has a figure for each.
@@ -28,7 +32,8 @@ impl Capture {
                 Some(CaptureFigure { name, unit: panel.unit.to_string(), min, mean, max })
             })
         });
-        Ok(Self { figures: figures.collect(), file, is_cut_off: torn, picture: poster.to_svg() })
+        let figures = figures.collect();
+        Ok(Self { figures, merit, file, is_cut_off: torn, picture: poster.to_svg() })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Capture, Fact, NodeReport};
+use super::{Capture, Fact, NodeReport, TunedGain, TunedLoop, Tuning};
 use crate::network::faults::RememberedError;
 use words::{counted, escaped};
 
@@ -15,6 +15,7 @@ impl NodeReport {
         self.limits_and_guard(&mut out);
         self.faults(&mut out);
         self.pdos(&mut out);
+        self.tunings.iter().for_each(|tuning| self::tuning(&mut out, tuning));
         self.captures.iter().for_each(|capture| self::capture(&mut out, capture));
         let _ = write!(
             out,
@@ -141,10 +142,56 @@ fn capture(out: &mut String, capture: &Capture) {
     };
     let title = format!("Capture: {}", capture.file);
     table(out, &title, ["Signal", "Least", "Mean", "Most"], capture.figures.iter().map(row).collect());
+    if let Some(merit) = &capture.merit {
+        let rows = merit.rows().into_iter().map(|row| row.map(|cell| escaped(&cell)));
+        rows_of(out, ["Motion", "Figure", "+-"], rows.collect());
+    }
     if capture.is_cut_off {
         classed(out, "fail", "The end of this record is missing: what came after is in neither figures nor picture.");
     }
     let _ = write!(out, "<figure>{}</figure>", capture.picture);
+}
+
+/// Before and after, side by side.
+fn tuning(out: &mut String, tuning: &Tuning) {
+    let gain =
+        |gain: &TunedGain| [code(&gain.object), escaped(&gain.name), gain.before.to_string(), gain.after.to_string()];
+    let mut rows: Vec<[String; 4]> = tuning.gains.iter().map(gain).collect();
+    let margins = |row: &TunedLoop| {
+        let state = if row.stable { "" } else { ", not stable" };
+        format!("{:.1} Hz, {:.0}° of phase, sensitivity {:.1}{state}", row.crossover_hz, row.phase_deg, row.sensitivity)
+    };
+    let mut add =
+        |what: &str, before: String, after: String| rows.push([String::new(), what.to_owned(), before, after]);
+    add("Speed loop: crossover and margins", margins(&tuning.before), margins(&tuning.after));
+    if let Some(position) = &tuning.position {
+        add("Position loop around it", "-".to_owned(), margins(position));
+    }
+    let errors = [
+        ("Error after a step and a load, on the twin", Some(tuning.twin_error)),
+        ("Error after a step, on the drive", tuning.drive_error),
+    ];
+    for (what, [before, after]) in errors.into_iter().filter_map(|(what, error)| Some((what, error?))) {
+        add(what, format!("{before:.2} r/min s"), format!("{after:.2} r/min s"));
+    }
+    table(out, "Tuning", ["Object", "What", "Before", "Proposed"], rows);
+    let resonance = match (tuning.anti_resonance_hz, tuning.resonance_hz) {
+        (Some(anti), Some(resonance)) => format!("anti-resonance {anti:.1} Hz, resonance {resonance:.1} Hz"),
+        _ => "no resonance".to_owned(),
+    };
+    let found = format!(
+        "Found: inertia {:.4e} kg·m², dry friction {:.3} N·m, viscous {:.4} N·m·s/rad, {resonance}; its twin is {:.0} % off. {}",
+        tuning.inertia_kg_m2,
+        tuning.dry_friction_nm,
+        tuning.viscous_friction_nm_s,
+        100.0 * tuning.twin_off,
+        if tuning.applied { "The drive was given the proposed values." } else { "The drive kept the values before." }
+    );
+    paragraph(out, &found);
+    tuning.notes.iter().for_each(|note| paragraph(out, note));
+    if !tuning.picture.is_empty() {
+        let _ = write!(out, "<figure>{}</figure>", tuning.picture);
+    }
 }
 
 fn facts(out: &mut String, title: &str, first: &[Fact], others: &[Fact]) {

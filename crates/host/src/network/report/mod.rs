@@ -6,6 +6,7 @@ mod capture;
 mod html;
 #[cfg(test)]
 mod tests;
+mod tuning;
 
 use std::collections::BTreeMap;
 
@@ -23,7 +24,10 @@ use super::Progress;
 use super::faults::{RememberedError, remembered};
 use super::params::{DiffRow, Refused, Shown, back_up, name};
 use super::pdos::PdoSetup;
+use crate::test_motion::Figures;
 use words::failure::Failure;
+
+pub use tuning::{TunedGain, TunedLoop, Tuning};
 
 /// Manufacturer hardware version (CiA 301, 7.5.2.9).
 const MANUFACTURER_HARDWARE_VERSION: Mux = Mux::new(0x1009, 0);
@@ -74,6 +78,8 @@ pub struct NodeReport {
     pub remembered_not_known: Option<String>,
     /// Records of runs.
     pub captures: Vec<Capture>,
+    /// Tunings, before and after.
+    pub tunings: Vec<Tuning>,
 }
 
 /// When a report was made, and by whom: what the program that makes it knows.
@@ -134,6 +140,8 @@ pub struct Capture {
     pub file: String,
     /// What it has of this node.
     pub figures: Vec<CaptureFigure>,
+    /// Figures of merit: of its steps, of what it followed, and of its current; `None` where it shows none of them.
+    pub merit: Option<Figures>,
     /// The end of it is missing: it ends earlier than the run.
     #[serde(rename = "cut_off")]
     pub is_cut_off: bool,
@@ -201,6 +209,7 @@ impl NodeReport {
             remembered,
             remembered_not_known,
             captures: Vec::new(),
+            tunings: Vec::new(),
         })
     }
 }

@@ -56,6 +56,7 @@ fn report(guard: Guard, fault: (Option<PresentFault>, Option<String>)) -> NodeRe
         remembered,
         remembered_not_known,
         captures: Vec::new(),
+        tunings: Vec::new(),
     }
 }
 
