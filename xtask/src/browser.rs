@@ -12,7 +12,7 @@ pub(crate) fn fetch() -> Result<(), String> {
     debian::install(PROGRAMS)
 }
 
-/// What judges whether everybody can use the page.
+/// What judges whether people with a disability can use the page.
 const AXE: &str = "axe-core";
 const AXE_VERSION: &str = "4.14.1";
 

@@ -280,8 +280,14 @@ fn try_it(folder: &Path, cross: Option<&Cross>) -> Vec<(&'static str, Result<(),
     match (wheel_in(&dist), cross) {
         (Some(wheel), None) => {
             tried.push(("the wheel works in a new environment", wheel_works(&wheel, &unpacked, &empty)));
+            if wheel::can_tag() {
+                let tagged = is_for_all(&wheel, std::env::consts::ARCH);
+                tried.push(("the wheel is one for all its machines", tagged));
+            }
         }
-        (Some(wheel), Some(cross)) => tried.push(("the wheel is one for all its machines", is_for_all(&wheel, cross))),
+        (Some(wheel), Some(cross)) => {
+            tried.push(("the wheel is one for all its machines", is_for_all(&wheel, cross.architecture.name)));
+        }
         (None, _) => {}
     }
     tried
@@ -315,9 +321,9 @@ fn program_works(unpacked: &Path, empty: &Path, cross: Option<&Cross>) -> Result
     if answer.contains("6041") { Ok(()) } else { Err(format!("it answered {answer}")) }
 }
 
-/// Its tag, which auditwheel gives by the files in it, names the architecture, any Linux and any Python. No Python of it is here to try.
-fn is_for_all(wheel: &Path, cross: &Cross) -> Result<(), String> {
-    let (name, architecture) = (wheel.file_name().unwrap_or_default().to_string_lossy(), cross.architecture.name);
+/// Its tag, which auditwheel gives by the files in it, names the architecture, any Linux and any Python.
+fn is_for_all(wheel: &Path, architecture: &str) -> Result<(), String> {
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
     let is_tagged = name.contains("-abi3-manylinux") && name.ends_with(&format!("_{architecture}.whl"));
     if is_tagged { Ok(()) } else { Err(format!("it is called {name}")) }
 }

@@ -30,7 +30,7 @@ pub(crate) enum When {
     Busy,
     /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the longest first.
     Waiting,
-    /// Only where it is named: it would make everybody's list longer by minutes, and is about few files.
+    /// Only where it is named: it would make the usual list longer by minutes, and is about few files.
     Named,
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct Rust {
     sysroot: Option<PathBuf>,
     /// The folder of the toolchain's own programs, with the linker.
     pub(crate) programs: PathBuf,
-    /// What is built with it: the flags are other ones than everybody's.
+    /// What is built with it: its flags are not those of the other steps.
     built: PathBuf,
 }
 

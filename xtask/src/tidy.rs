@@ -10,6 +10,7 @@ mod conventions;
 mod dependencies;
 mod exceptions;
 mod finding;
+mod glossary;
 mod manifests;
 mod paths;
 mod sizes;
@@ -48,7 +49,8 @@ const SOURCE_RULES: &[SourceRule] = &[
     unsafe_code::in_code,
 ];
 
-const TEXT_RULES: &[TextRule] = &[text::typography, text::machine_paths, text::line_ends, wording::habits];
+const TEXT_RULES: &[TextRule] =
+    &[text::typography, text::machine_paths, text::line_ends, wording::habits, sizes::pages];
 
 /// Runs `cargo xtask tidy`.
 pub(crate) fn command() -> ExitCode {
@@ -75,6 +77,8 @@ fn findings() -> Result<Vec<Finding>, String> {
     });
     found.extend(dependencies::allowances(&packages));
     let (mut sources, mut python) = (Vec::new(), Vec::new());
+    // What a reader of the glossary may have read.
+    let (mut glossary, mut read) = (String::new(), Vec::new());
     for path in tracked_files()? {
         // A file that is listed but deleted, or that is not text, has no style.
         let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
@@ -83,6 +87,11 @@ fn findings() -> Result<Vec<Finding>, String> {
         found.extend(manifests::of_crates(&path, &text, exists));
         found.extend(paths::of_page(&path, &text, exists));
         found.extend(unsafe_code::of_manifest(&path, &text));
+        if path == glossary::PAGE {
+            glossary.clone_from(&text);
+        } else if [".rs", ".md", ".js", ".py"].iter().any(|ending| path.ends_with(ending)) {
+            read.push(text.to_lowercase());
+        }
         if path.ends_with(".rs") {
             let source = Source::new(&path, &text);
             SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
@@ -92,6 +101,9 @@ fn findings() -> Result<Vec<Finding>, String> {
             python.push((path, text));
         }
     }
+    let in_use = |word: &str| read.iter().any(|text| glossary::stands_in(word, text));
+    // A type is written in one: `MovedAxis`.
+    found.extend(glossary::of_page(&glossary, |word| in_use(word) || in_use(&word.replace(' ', ""))));
     found.extend(circles::in_crates(&sources));
     found.extend(circles::in_packages(&python));
     let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);

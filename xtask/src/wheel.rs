@@ -37,6 +37,11 @@ pub(crate) fn fetch() -> Result<(), String> {
     python::environment_of(VENV, PACKAGES).map(|_| ())
 }
 
+/// Whether a wheel can be given its tag here.
+pub(crate) fn can_tag() -> bool {
+    cfg!(target_os = "linux") && python::environment_of(VENV, PACKAGES).is_ok()
+}
+
 /// Gives the wheel the tag of what it needs; returns its new path, or why it keeps the old one.
 pub(crate) fn tag(wheel: &Path) -> Result<PathBuf, String> {
     if !cfg!(target_os = "linux") {

@@ -18,7 +18,7 @@ use crate::record::{Content, Direction, Entry, Interface, RawErrorFrame, Record}
 
 pub(super) const FILE_SIGNATURE: [u8; 4] = *b"LOGG";
 pub(super) const OBJECT_SIGNATURE: [u8; 4] = *b"LOBJ";
-/// Length of the head of a file: a field of the file, the same in all.
+/// Length of the header of a file: a field of the file, the same in all.
 pub(super) const FILE_HEAD: usize = 144;
 /// Where the begin of the measurement stands in it.
 pub(super) const BEGIN_OF_MEASUREMENT: usize = 40;
@@ -58,7 +58,7 @@ const MAX_SIZE: u32 = 16 << 20;
 /// Largest object in a container. None about frames comes near; a damaged length must not swallow the rest of the log.
 const MAX_INNER_SIZE: u32 = 1 << 20;
 
-/// Types that are reported; a damaged file could have four thousand million.
+/// Types that are reported; a damaged file could have four billion.
 const MAX_TOLD: usize = 64;
 
 #[derive(Debug)]
@@ -110,7 +110,7 @@ impl<R: Read> BlfReader<R> {
         self.stage = Stage::Objects;
         if read < FILE_HEAD || head[..4] != FILE_SIGNATURE {
             self.stage = Stage::End;
-            return Ok(Some(found(0, "this is not a BLF file: it does not begin with LOGG and a head of 144 bytes")));
+            return Ok(Some(found(0, "this is not a BLF file: it does not begin with LOGG and a header of 144 bytes")));
         }
         let fields = std::array::from_fn(|i| u16_at(&head, BEGIN_OF_MEASUREMENT + 2 * i));
         // A missing date is not an error: the times then count from the begin.
@@ -132,7 +132,7 @@ impl<R: Read> BlfReader<R> {
         }
         if read < BASE_HEAD {
             self.stage = Stage::End;
-            return Ok(Some(found(place, "the log ends within the head of an object")));
+            return Ok(Some(found(place, "the log ends within the header of an object")));
         }
         let size = u32_at(&head, 8);
         if head[..4] != OBJECT_SIGNATURE || (size as usize) < BASE_HEAD {

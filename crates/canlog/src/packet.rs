@@ -53,7 +53,7 @@ pub(super) fn parse(link: u32, packet: &[u8]) -> Result<Option<(Option<Direction
 }
 
 fn content(packet: &[u8]) -> Result<Content, &'static str> {
-    let (head, data) = packet.split_at_checked(CAN_HEAD).ok_or("a packet is shorter than the head of a CAN frame")?;
+    let (head, data) = packet.split_at_checked(CAN_HEAD).ok_or("a packet is shorter than the header of a CAN frame")?;
     let raw = u32::from_be_bytes([head[0], head[1], head[2], head[3]]);
     let length = usize::from(head[4]);
     let id = if raw & EXTENDED != 0 { CanId::extended(raw) } else { CanId::standard(raw as u16) };

@@ -89,7 +89,7 @@ impl<R: Read> PcapReader<R> {
                 return Ok(Ok(None));
             }
             16 => {}
-            _ => return Ok(Err(found(place, "the log ends within the head of a packet"))),
+            _ => return Ok(Err(found(place, "the log ends within the header of a packet"))),
         }
         let number = |place: usize| {
             let bytes = [head[place], head[place + 1], head[place + 2], head[place + 3]];
@@ -171,7 +171,7 @@ mod tests {
         );
         for (bytes, reason) in [
             (&whole[..whole.len() - 1], "ends within a packet"),
-            (&whole[..30], "ends within the head of a packet"),
+            (&whole[..30], "ends within the header of a packet"),
             (&whole[..20], "not a pcap file"),
             (&file(false, MICROSECONDS, &[(1, 0, SYNC)])[..24], ""),
         ] {

@@ -104,7 +104,7 @@ impl<R: Read> PcapngReader<R> {
                 self.state = ReadState::End;
                 return Ok(Ok(None));
             }
-            _ => return fatal("the log ends within the head of a block"),
+            _ => return fatal("the log ends within the header of a block"),
         }
         // The same in both byte orders.
         let is_section = head[..4] == SECTION.to_be_bytes();
@@ -112,7 +112,7 @@ impl<R: Read> PcapngReader<R> {
         if is_section {
             // The byte order stands behind the length that it is the byte order of.
             if !self.source.read_exactly(4, &mut body)? {
-                return fatal("the log ends within the head of a section");
+                return fatal("the log ends within the header of a section");
             }
             self.swapped = match self.number_in(&body, 0, false) {
                 BYTE_ORDER => false,

@@ -61,7 +61,7 @@ pub struct RawErrorFrame {
 }
 
 impl RawErrorFrame {
-    /// What a log means that says "error frame" and no more: class `CAN_ERR_BUSERROR`.
+    /// An error frame of which a log gives no details: class `CAN_ERR_BUSERROR`.
     pub const UNSPECIFIED: Self = Self { class: 0x80, data: [0; 8] };
 }
 

@@ -99,7 +99,7 @@ impl Parser {
             (Some("FD" | "FB" | "FE" | "BI"), _) => Content::FdFrame { id: fields.id()?, length: fields.fd_length()? },
             (Some("ER"), _) | (None, Some("Error")) => Content::Error(RawErrorFrame::UNSPECIFIED),
             (Some("ST" | "EC" | "EV"), _) | (None, Some("Warng" | "Event")) => return Ok(None),
-            (Some(_), _) => return Err("the type of message is none of DT, FD, FB, FE, BI, RR, ST, ER, EC, EV"),
+            (Some(_), _) => return Err("unknown type of message, expected DT, FD, FB, FE, BI, RR, ST, ER, EC, EV"),
             (None, None) if fields.id == NO_ID => return Ok(None),
             (None, Some("Rx" | "Tx") | None) => fields.data_frame()?,
             (None, Some(_)) => return Err("expected Rx or Tx before the identifier"),
@@ -122,7 +122,7 @@ impl Parser {
                 // From 2.0 on the file names the columns.
                 self.columns = known.map(|(_, columns)| columns.to_vec()).unwrap_or_default();
                 if self.columns.is_empty() && !value.starts_with("2.") {
-                    return Err("the version of the file is none from 1.0 to 2.1");
+                    return Err("unsupported version of the file, expected 1.0 to 2.1");
                 }
             }
             "STARTTIME" => {
@@ -132,7 +132,7 @@ impl Parser {
             "COLUMNS" => {
                 let columns: Option<Vec<TrcColumn>> =
                     value.split(',').take(MAX_COLUMNS).map(|name| column(name.trim())).collect();
-                self.columns = columns.ok_or("the columns are none of N, O, T, B, I, d, R, l, L, D")?;
+                self.columns = columns.ok_or("unknown columns, expected some of N, O, T, B, I, d, R, l, L, D")?;
             }
             _ => {}
         }

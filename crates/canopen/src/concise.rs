@@ -92,7 +92,7 @@ impl<'a> Concise<'a> {
     /// Takes a stream that has all entries that it says to have, and nothing else.
     ///
     /// # Errors
-    /// What is wrong with it, and where. Nothing of a broken stream is given out: half a configuration is none.
+    /// What is wrong with it, and where. Nothing of a broken stream is given out: half a configuration cannot be used.
     pub fn parse(stream: &'a [u8]) -> Result<Self, ConciseError> {
         let Some((count, entries)) = stream.split_first_chunk::<COUNT>() else {
             return Err(ConciseError::NoCount { length: stream.len() });
@@ -180,7 +180,7 @@ impl fmt::Display for ConciseError {
                 if let Some(mux) = mux {
                     write!(f, ", for {mux}")?;
                 }
-                write!(f, ": it needs {needed} bytes, and {left} are left: the concise DCF was cut off, or is none")
+                write!(f, ": it needs {needed} bytes, and {left} are left: it is truncated or not a concise DCF")
             }
             Self::Goes { entries, at, left } => write!(
                 f,
@@ -245,8 +245,8 @@ mod tests {
                 other => panic!("{length} bytes: {other}"),
             }
         }
-        let expected = "entry 2 of 2, at byte 12, for 2000h:00: it needs 13 bytes, and 12 are left: the concise DCF was \
-                        cut off, or is none";
+        let expected = "entry 2 of 2, at byte 12, for 2000h:00: it needs 13 bytes, and 12 are left: it is \
+                        truncated or not a concise DCF";
         assert_eq!(refusal(&bytes[..24]).to_string(), expected);
     }
 

@@ -93,7 +93,7 @@ impl Service {
         })
     }
 
-    /// The identifier of the service; `None` for PDO 5 and further ones, which have none before they are given one.
+    /// The identifier of the service; `None` for PDO 5 and further ones, which have no default COB-ID.
     pub const fn can_id(self) -> Option<CanId> {
         Some(match self {
             Self::Nmt => NMT,

@@ -29,7 +29,7 @@ impl Default for InterpolationPeriod {
 }
 
 impl InterpolationPeriod {
-    /// In nanoseconds; `None` if that is none or does not fit (or is not whole: below a nanosecond).
+    /// In nanoseconds; `None` if it is invalid or out of range (or not whole: below a nanosecond).
     pub const fn nanos(self) -> Option<u64> {
         let exponent = self.index as i32 + 9;
         if self.value == 0 || exponent < 0 || exponent > 18 {

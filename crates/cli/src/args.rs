@@ -78,7 +78,7 @@ pub(crate) enum Command {
     ManPages(man_pages::ManPages),
     /// Options that every command takes, before or after it
     ///
-    /// A command refuses those that have no effect on it; its help names the others.
+    /// A command refuses those that have no effect on it; its help lists the ones it takes.
     #[command(hide = true)]
     Options,
 }

@@ -38,7 +38,7 @@ pub(crate) struct Context {
     pub(crate) machine: Option<Machine>,
     /// The world around the drives, where they are virtual ones whose time passes with the clock.
     pub(crate) world: Option<WorldDoor>,
-    /// What is true of the drives, where they are virtual ones of this program.
+    /// True values from the simulation, where the drives are virtual ones of this program.
     pub(crate) true_values: Option<LiveValues>,
     /// What the bus says beside frames.
     pub(crate) wire: Wire,

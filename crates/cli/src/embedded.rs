@@ -61,7 +61,7 @@ pub(crate) async fn wait_until_booted(
             Failure::new(format!("the virtual drive at node {node} did not boot"))
                 .of_kind("no_boot_up")
                 .at_node(*node)
-                .next("see that the machine file gives it power and the bit rate of the bus")
+                .next("check that the machine file gives it power and the bit rate of the bus")
         })?;
     }
     network.sleep(SETTLING_TIME).await;

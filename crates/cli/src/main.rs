@@ -309,7 +309,7 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Capture(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Record(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Export(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Fmu(fmu) => print(format, &fmu.run()?),
+        Command::Fmu(fmu) => print(format, &fmu.run(format.json)?),
         Command::Gateway(command) => session::run(global, async |context| command.run(context, format).await),
         Command::Top(command) => session::run_live(global, async |context| command.run(context, format).await),
         Command::Studio(command) => session::run_live(global, async |context| command.run(context, format).await),

@@ -1,7 +1,8 @@
 //! What a command has to say: one value, printed as text for people or as JSON for programs.
 
+use std::fs::File;
 use std::io::{self, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -84,6 +85,58 @@ pub(crate) fn file_path(text: &str) -> Result<PathBuf, String> {
         "" | "-" => Err("expected the path of a file: only -o/--output takes - for standard output".into()),
         path => Ok(path.into()),
     }
+}
+
+/// A page that is written beside what goes to standard output: NAME.html.
+pub(crate) fn html_path(text: &str) -> Result<PathBuf, String> {
+    of_ending(text, ".html")
+}
+
+/// A result for build servers that is written beside what goes to standard output: NAME.xml.
+pub(crate) fn junit_path(text: &str) -> Result<PathBuf, String> {
+    of_ending(text, ".xml")
+}
+
+fn of_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
+    let path = file_path(text)?;
+    if text.to_ascii_lowercase().ends_with(ending) { Ok(path) } else { Err(format!("expected NAME{ending}")) }
+}
+
+/// True for the `-` that means standard output.
+pub(crate) fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Refuses lines of JSON beside a file that goes to standard output.
+pub(crate) fn refuse_json_beside(what: &str, output: Option<&Path>, prints_json: bool) -> Result<(), Failure> {
+    if prints_json && output.is_some_and(is_stdout) {
+        return Err(Failure::usage(format!("{what} and lines of JSON cannot both go to standard output"))
+            .next("give --output a file, or omit --json"));
+    }
+    Ok(())
+}
+
+/// The line with the places at which a served bus can be reached.
+pub(crate) fn ready_line(json: bool, places: &[String]) -> String {
+    #[derive(Serialize)]
+    struct Ready<'a> {
+        ok: bool,
+        ready: &'a [String],
+    }
+    if json {
+        return sim::json::line(&Ready { ok: true, ready: places });
+    }
+    let places = places.iter().map(|place| format!(" {place}"));
+    ["ready".to_owned()].into_iter().chain(places).collect()
+}
+
+/// Standard output as a file of its own.
+pub(crate) fn stdout_file() -> io::Result<File> {
+    #[cfg(unix)]
+    let own = std::os::fd::AsFd::as_fd(&io::stdout()).try_clone_to_owned();
+    #[cfg(windows)]
+    let own = std::os::windows::io::AsHandle::as_handle(&io::stdout()).try_clone_to_owned();
+    own.map(File::from)
 }
 
 /// One text and a line end on standard output, at once.

@@ -125,7 +125,7 @@ fn column(heading: &str) -> Column {
     }
 }
 
-/// The cells of a table's line; `None` if it is none.
+/// The cells of a table's line; `None` of another line.
 fn cells(line: &str) -> Option<Vec<String>> {
     let inner = line.trim().strip_prefix('|')?.strip_suffix('|')?;
     Some(inner.split('|').map(|cell| plain(cell.trim())).collect())

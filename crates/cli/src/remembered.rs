@@ -17,7 +17,7 @@ const MAX_BUSES: usize = 32;
 /// Messages that are remembered as shown; the oldest is forgotten first, and is shown again.
 const MAX_SAID: usize = 256;
 
-/// A larger file is none of ours.
+/// This program writes no larger file.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// See the [module](self).
@@ -51,7 +51,7 @@ impl Remembered {
         Self::of(path())
     }
 
-    /// A file that is not there, cannot be read or is none of ours is an empty one.
+    /// A file that is not there, cannot be read or is not of this program counts as empty.
     fn of(path: Option<PathBuf>) -> Self {
         let text = path.as_ref().and_then(|path| {
             let small = fs::metadata(path).is_ok_and(|file| file.is_file() && file.len() <= MAX_BYTES);

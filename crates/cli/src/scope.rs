@@ -31,10 +31,11 @@ const REALTIME: &str = "realtime";
 const LOG: &str = "log";
 const SDO_SERVER: &str = "sdo_servers";
 const SYNC_COUNTER: &str = "sync_counter";
+const JSON: &str = "json";
 
 const ALL: &[&str] = &[BUS, MODEL, SDO_SERVER, SYNC_COUNTER, MACHINE, TIMEOUT, VERBOSE, REALTIME, LOG];
 
-const UNHEEDED: [Unheeded; 16] = [
+const UNHEEDED: [Unheeded; 19] = [
     Unheeded {
         command: "run",
         options: ALL,
@@ -103,6 +104,14 @@ const UNHEEDED: [Unheeded; 16] = [
         why: "a script for a shell depends on none of them",
         next: "omit it",
     },
+    Unheeded {
+        command: "top",
+        options: &[JSON],
+        why: "it draws on a terminal and has no JSON output",
+        next: "ferrodrive watch NODE OBJECT .. --json prints what changes, a line each; ferrodrive studio serves /api/state",
+    },
+    Unheeded { command: "completions", options: &[JSON], why: "what it prints is a script", next: "omit it" },
+    Unheeded { command: "man-pages", options: &[JSON], why: "it writes files, and prints nothing", next: "omit it" },
     Unheeded { command: "eds", options: ALL, why: "it is about files, not about a node of a bus", next: "omit it" },
     Unheeded {
         command: "check",
@@ -135,7 +144,7 @@ const CHECK_OF_A_FILE: Unheeded = Unheeded {
 const INIT_OF_DRIVES: Unheeded = Unheeded {
     command: "init",
     options: ALL,
-    why: "--drive says which drives there are, and the bus is not asked",
+    why: "the drives come from --drive, not from the bus",
     next: "omit it, or give --bus in place of --drive",
 };
 
@@ -236,7 +245,7 @@ mod tests {
 
     const REAL_BUS: &str = "socketcand://127.0.0.1:1/can0";
 
-    /// What is typed for each option that every command has, but for `--json`, which all heed.
+    /// What is typed for each option that every command has.
     fn typed(option: &str) -> Vec<&'static str> {
         let machine = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.toml");
         match option {
@@ -249,6 +258,7 @@ mod tests {
             LOG => vec!["--log", "frames.log"],
             SDO_SERVER => vec!["--sdo-server", "4=2"],
             SYNC_COUNTER => vec!["--sync-counter", "10"],
+            JSON => vec!["--json"],
             other => panic!("what is typed for {other}?"),
         }
     }
@@ -271,10 +281,10 @@ mod tests {
         built.build();
         let options: Vec<_> = Cli::command()
             .get_arguments()
-            .filter(|argument| argument.is_global_set() && argument.get_id() != "json")
+            .filter(|argument| argument.is_global_set())
             .map(|argument| argument.get_id().to_string())
             .collect();
-        assert_eq!(options.len(), ALL.len(), "{options:?}");
+        assert_eq!(options.len(), ALL.len() + 1, "{options:?}");
         // Made once: that takes longer than to parse a line.
         let mut parser = command_line();
         for its in built.get_subcommands().filter(|its| !["help", help::OPTIONS].contains(&its.get_name())) {

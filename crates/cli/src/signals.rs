@@ -45,7 +45,7 @@ impl Signal {
             Self::HangUp => "the terminal was closed (SIGHUP)",
             Self::Interrupt => "interrupted",
             Self::Quit => "interrupted (SIGQUIT)",
-            Self::Terminate => "asked to end (SIGTERM)",
+            Self::Terminate => "terminated (SIGTERM)",
         }
     }
 }

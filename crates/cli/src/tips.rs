@@ -20,7 +20,7 @@ fn named<'a>(command: &'a Command, words: &[String]) -> &'a Command {
     found
 }
 
-/// The first examples of the help of the command that is named, for who left out what it needs.
+/// The first examples of the help of the command that is named, where what it needs was left out.
 pub(crate) fn examples(command: &Command, words: &[String]) -> Vec<String> {
     let command = named(command, words);
     let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
@@ -29,7 +29,7 @@ pub(crate) fn examples(command: &Command, words: &[String]) -> Vec<String> {
     examples.take(EXAMPLES).map(|line| format!("e.g. {line}")).collect()
 }
 
-/// The commands of the command that is named, for who typed none of them.
+/// The commands of the command that is named, where none of them was typed.
 pub(crate) fn commands(command: &Command, words: &[String]) -> Option<String> {
     let parent = named(command, words);
     let names: Vec<_> = parent.get_subcommands().filter(|its| !its.is_hide_set() && its.get_name() != "help").collect();

@@ -24,7 +24,7 @@ pub struct GuardArgs {
     /// this command in any case.
     #[arg(long, value_name = "on|off", num_args = 0..=1, default_missing_value = "on")]
     guard: Option<OnOff>,
-    /// Same as --guard off: no heartbeat is sent, and a drive that needs one goes on
+    /// Same as --guard off: no heartbeat is sent, and a drive keeps moving
     #[arg(long, conflicts_with = "guard")]
     no_guard: bool,
 }

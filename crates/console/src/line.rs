@@ -162,7 +162,7 @@ async fn carry_out(command: &LineCommand, hands: Hands) -> Said {
     Said { text: lines.join("\n"), ..said }
 }
 
-/// A failure whose advice is for who types into a page.
+/// A failure whose advice is for people who type into a page.
 fn of_a_page(mut failure: words::failure::Failure) -> words::failure::Failure {
     failure.next.iter_mut().for_each(|advice| *advice = advice_of_a_page(advice));
     failure

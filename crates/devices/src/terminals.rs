@@ -36,8 +36,8 @@ impl Terminals {
         }),
     };
 
-    /// Whether an input is active, from the values of [`levels`](Self::levels) and [`polarity`](Self::polarity) (0 where there
-    /// is none).
+    /// Whether an input is active, from the values of [`levels`](Self::levels) and [`polarity`](Self::polarity) (0 where the
+    /// model has none).
     pub const fn is_active(input: &Input, levels: i64, polarity: i64) -> bool {
         (levels ^ polarity) >> input.bit & 1 == 1
     }

@@ -54,7 +54,7 @@ impl core::fmt::Display for Span {
 impl Timing {
     /// A motor drive of which nothing is known: what a microcontroller of this class takes.
     pub const GUESSED: Self = Self {
-        boot: Span::new(800_000, 1_200_000, "guess: a second, of which the self-test takes most"),
+        boot: Span::new(800_000, 1_200_000, "guess: one second, mostly self-test"),
         reset_node: Span::new(400_000, 600_000, "guess: half a boot, since supply and oscillator are there"),
         reset_communication: Span::new(10_000, 30_000, "guess: the communication objects are loaded from the EEPROM"),
         sdo_answer: Span::new(

@@ -276,7 +276,7 @@ rules! {
         "It is what the user wants, and the device is asked; by the file it refuses the value, with 0609 \
         0031h or 0609 0032h.",
         "ParameterValue=950" => "ParameterValue=600";
-    /// A node-ID that is none.
+    /// A node-ID out of range.
     NodeId = 311, Error, "a node-ID that is not 1 to 127", "none",
         "CiA 306-1, device configuration file (5); CiA 301, 7.3.3",
         "Identifiers are made of it: with 128 the EMCY message would have the identifier of TIME.",

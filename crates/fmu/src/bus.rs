@@ -132,7 +132,7 @@ impl BusUnit {
     /// Writes a parameter.
     ///
     /// # Errors
-    /// A probability that is none.
+    /// A probability that is not 0 to 1.
     pub fn set(&mut self, reference: Reference, value: &Value) -> Result<(), String> {
         Self::check(reference, value)?;
         match (reference, value) {

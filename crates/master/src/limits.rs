@@ -94,7 +94,7 @@ impl fmt::Display for Limits {
             write!(f, "; it acts up to {most}, by {setting}")?;
         }
         match self.raised_to {
-            Some((least, setting)) => write!(f, "; what is less but 0 acts as {least}, by {setting}"),
+            Some((least, setting)) => write!(f, "; smaller values (except 0) act as {least}, by {setting}"),
             None => Ok(()),
         }
     }

@@ -72,7 +72,7 @@ impl Commutation {
     }
 
     /// The same of periods in which the shaft may come far beyond a border before it is seen: the border is taken to lie in the
-    /// middle of the way of the period, and half of it is none of a disagreement.
+    /// middle of the way of the period, and half of it does not count as a disagreement.
     pub fn follow(&mut self, model: &CommutationModel, hall: u8, count: u16) -> f32 {
         let moved = count.wrapping_sub(self.register) as i16;
         let (was_aligned, changes) = (self.aligned, hall != self.hall);

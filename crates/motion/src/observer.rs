@@ -84,7 +84,7 @@ impl Observer {
     /// The same once in a period as long as many, of a shaft whose mean velocity over that period is known, in counts per period:
     /// what the edges would tell of it. The mean over spans of half a window to a window comes late by half of three quarters of
     /// a window; a mean over one period by half a period, and a first-order lag brings the rest. Less than one count in the time
-    /// of a standstill is none.
+    /// of a standstill counts as zero speed.
     pub fn follow(&mut self, gains: &ObserverGains, count: u16, velocity: f32) {
         let moved = count.wrapping_sub(self.register) as i16;
         self.register = count;

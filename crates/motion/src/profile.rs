@@ -46,7 +46,7 @@ pub(crate) struct Jerk {
 pub(crate) const MAX_JERKS: usize = 11;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Course {
+enum Segments {
     Stretches(Shape, [Stretch; MAX_STRETCHES]),
     Jerks(Point, [Jerk; MAX_JERKS]),
 }
@@ -54,21 +54,21 @@ enum Course {
 /// A planned motion. Before its start it rests at zero, after its end at [`Profile::end`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
-    course: Course,
+    segments: Segments,
     end: Point,
     duration_s: f64,
 }
 
 impl Profile {
     fn new(shape: Shape) -> Self {
-        let course = Course::Stretches(shape, Default::default());
-        Profile { course, end: Point::default(), duration_s: 0.0 }
+        let segments = Segments::Stretches(shape, Default::default());
+        Profile { segments, end: Point::default(), duration_s: 0.0 }
     }
 
     /// Stretches of constant jerk from `start`, which come to `end`.
     pub(crate) fn of_jerks(start: Point, jerks: [Jerk; MAX_JERKS], end: Point) -> Self {
         let duration_s = jerks.iter().map(|jerk| jerk.duration_s).sum();
-        Profile { course: Course::Jerks(start, jerks), end, duration_s }
+        Profile { segments: Segments::Jerks(start, jerks), end, duration_s }
     }
 
     /// Time from start to end.
@@ -100,8 +100,8 @@ impl Profile {
             return Point { position, ..self.end };
         }
         let mut time_s = time_s.max(0.0);
-        match &self.course {
-            Course::Stretches(shape, stretches) => {
+        match &self.segments {
+            Segments::Stretches(shape, stretches) => {
                 let mut position = 0.0;
                 for stretch in stretches {
                     if time_s < stretch.duration_s {
@@ -111,7 +111,7 @@ impl Profile {
                     position += stretch.distance();
                 }
             }
-            Course::Jerks(start, jerks) => {
+            Segments::Jerks(start, jerks) => {
                 let mut from = *start;
                 for jerk in jerks {
                     if time_s < jerk.duration_s {
@@ -127,16 +127,16 @@ impl Profile {
 
     /// Joins one more stretch; one without duration leaves only its step of velocity.
     fn push(&mut self, index: usize, duration_s: f64, from: f64, to: f64) {
-        if let Course::Stretches(_, stretches) = &mut self.course {
+        if let Segments::Stretches(_, stretches) = &mut self.segments {
             stretches[index] = Stretch { duration_s, from, to };
             self.duration_s += duration_s;
         }
     }
 
     fn travelled(&self) -> f64 {
-        match &self.course {
-            Course::Stretches(_, stretches) => stretches.iter().map(Stretch::distance).sum(),
-            Course::Jerks(..) => self.end.position,
+        match &self.segments {
+            Segments::Stretches(_, stretches) => stretches.iter().map(Stretch::distance).sum(),
+            Segments::Jerks(..) => self.end.position,
         }
     }
 }

@@ -94,7 +94,7 @@ pub enum Colour {
     Purple,
     /// For temperatures, and for the fifth.
     Red,
-    /// For what is none of these, and for the sixth.
+    /// For anything else, and for the sixth.
     Grey,
 }
 

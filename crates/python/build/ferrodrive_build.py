@@ -1,7 +1,7 @@
 """The build backend (PEP 517): maturin's, with cargo's profile chosen here.
 
 `pip install .` in a clone builds the Python module alone, in the profile of the tests (`dev`: what computes is optimised, the rest is
-not), which takes about a minute. The command line is one that is there: `cargo install --path crates/cli`, or that of a release,
+not); docs/performance.md has how long that takes. The command line is one that is there: `cargo install --path crates/cli`, or that of a release,
 whose wheel has it.
 
 `FERRODRIVE_PROFILE` names another profile of cargo: `release`, or `dist` for what is released.

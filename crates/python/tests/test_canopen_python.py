@@ -40,7 +40,7 @@ def test_two_nodes_have_booted(ferrodrive_world):
         ferrodrive_world.add("zlac8030l", node=number)
         network.add_node(number, canopen.ObjectDictionary())
     for node in network.values():
-        # The boot-up of the second one passes while the first is waited for: have each boot when it is waited for.
+        # The boot-up of the second one passes while the first is waited for: reset each node before waiting for it.
         node.nmt.state = "RESET"
         node.nmt.wait_for_bootup(5)
     for node in network.values():

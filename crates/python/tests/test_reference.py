@@ -3,6 +3,7 @@
 import asyncio
 import difflib
 import doctest
+import inspect
 import os
 import pathlib
 import re
@@ -257,6 +258,67 @@ def test_what_is_public_is_described_and_what_is_called_has_an_example(entry):
     assert entry.words.strip(), f"{entry.name} has no docstring"
     refers = entry.words.startswith("As :meth:")
     assert not entry.is_called or refers or ">>>" in entry.words, f"{entry.name} has no example"
+
+
+CALLED = [entry for entry in ENTRIES if entry.is_called and not entry.signature.startswith("class ")]
+#: A unit that ends a name, and one among words; what has none is counted, or is a share.
+UNIT_OF_NAME = re.compile(r"_(rpm|deg|rad|m|s|ms|us|ns|hz|a|v|c|nm|n|kg|m2|w|s2|s3|ohm|turns)$")
+UNIT_IN_WORDS = re.compile(
+    r"\b(s|ms|seconds?|r/min|degrees?|rad|m|mm|Hz|A|V|N|kg|turns?|counts?|share|ratio|times|probability|0 to 1)\b|N·m|°C|%"
+)
+
+
+def words_of(entry):
+    """Its own, and those of what it refers to."""
+    refers = re.match(r"(?:As )?:meth:`~?(?:ferrodrive\.)?([\w.]+)`", entry.words)
+    names = {refers.group(1), f"{entry.name.split('.')[0]}.{refers.group(1)}"} if refers else set()
+    named = [other.words for other in ENTRIES if other.name in names]
+    return "\n".join([entry.words, *named])
+
+
+def numbers_of(entry):
+    """The parameters that are numbers with fractions."""
+    inside = re.search(r"\((.*)\)", entry.signature.split(" -> ")[0])
+    parameters = re.split(r", (?![^\[]*\])", inside.group(1)) if inside else []
+    parted = [re.match(r"\*{0,2}(\w+): ([^=]+?)(?: = .*)?$", parameter) for parameter in parameters]
+    return [part.group(1) for part in parted if part and re.search(r"\b(float|Number)\b", part.group(2))]
+
+
+def test_a_number_has_its_unit_in_its_name_or_in_words():
+    unstated = []
+    for entry in CALLED:
+        words = words_of(entry)
+        for name in numbers_of(entry):
+            own = re.search(rf":param {name}: ((?:.|\n)*?)(?=\n *:|\n\n|$)", words)
+            beside = words.split(">>>")[0]
+            in_words = UNIT_IN_WORDS.search(own.group(1)) if own and "imes in s" not in beside else UNIT_IN_WORDS.search(beside)
+            if not UNIT_OF_NAME.search(name) and not in_words:
+                unstated.append(f"{entry.name}: {name}")
+    assert sum(len(numbers_of(entry)) for entry in CALLED) > 100
+    assert not unstated, unstated
+
+
+def function_of(name):
+    """What is called, where it is written in Python."""
+    thing = ferrodrive
+    for part in name.split("."):
+        thing = inspect.getattr_static(thing, part) if inspect.isclass(thing) else getattr(thing, part)
+    thing = inspect.unwrap(getattr(thing, "__func__", thing))
+    return thing if inspect.isfunction(thing) else None
+
+
+def test_an_error_that_a_call_raises_by_itself_is_named_in_its_words():
+    unnamed, seen = [], 0
+    for entry in CALLED:
+        function = function_of(entry.name) if entry.name not in reference.STUB else None
+        if function is None:
+            continue
+        body = inspect.getsource(function).split('"""')[-1]
+        raised = {kind for kind in re.findall(r"raise (\w+)", body) if kind[0].isupper()}
+        seen += len(raised)
+        unnamed += [f"{entry.name}: {kind}" for kind in raised if kind not in words_of(entry)]
+    assert seen > 10
+    assert not unnamed, unnamed
 
 
 WITH_EXAMPLES = [entry for entry in ENTRIES if ">>>" in entry.words]

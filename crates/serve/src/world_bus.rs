@@ -1,7 +1,7 @@
 //! The embedded world as a bus that passes with the clock, for a command that serves people: they live in its time.
 //!
 //! The world is moved whenever its bus is used, and at least once a millisecond. One that falls far behind (the machine slept)
-//! does not hurry after: the time between is left out.
+//! does not catch up: the time between is left out.
 
 use std::time::Duration;
 

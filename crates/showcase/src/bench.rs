@@ -209,7 +209,7 @@ impl Bench {
         self.rows.push(Row::new(section, step));
     }
 
-    /// Begins a row: sends a frame, and gives it and what it does some time, which is none where an answer is waited for.
+    /// Begins a row: sends a frame, and gives it and what it does some time: zero where an answer is waited for.
     pub(super) fn request(&mut self, step: impl Into<String>, frame: Frame, time: Duration) {
         self.step(step);
         self.row().asked = self.shown(&frame);

@@ -134,7 +134,7 @@ pub enum CommandError {
     #[error(transparent)]
     Stimulus(#[from] StimulusError),
     /// No drive has this number.
-    #[error("no drive was started as node {number}; there is {present}")]
+    #[error("no drive at node {number}; running: {present}")]
     NoSuchDrive {
         /// The number given.
         number: u8,

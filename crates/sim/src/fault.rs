@@ -29,7 +29,7 @@ impl Corruption {
         Self { probability: probability.clamp(0.0, 1.0), ..Self::default() }
     }
 
-    /// Also destroys the `n`-th attempt from here on (the next is 1), so that everybody sees the error in the
+    /// Also destroys the `n`-th attempt from here on (the next is 1), so that every node sees the error in the
     /// `bit`-th bit of the frame (start of frame is 1, stuff bits count).
     pub fn and_nth_at_bit(mut self, n: u64, bit: u32) -> Self {
         self.nth.insert(n, bit);
@@ -69,7 +69,7 @@ pub struct NodeFaults {
     pub babble: Option<Babble>,
     /// Loses frames that come too fast.
     pub overrun: Option<Overrun>,
-    /// The probability with which an attempt to send fails for a bad contact of its own: everybody sees the error, and
+    /// The probability with which an attempt to send fails for a bad contact of its own: every node sees the error, and
     /// its error counter rises towards bus-off.
     pub corrupt: f64,
 }

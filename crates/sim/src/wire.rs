@@ -4,7 +4,7 @@
 //! [`Bus::offer`]; time comes in with [`Bus::arbitrate`] and [`Bus::advance`]; frames that passed,
 //! errors and changes of error state come out. The lowest arbitration key wins an idle wire and holds
 //! it for the exact bits of the frame; a frame that is not acknowledged, or that was disturbed, costs
-//! an error frame and counts in the error counters of everybody who saw it.
+//! an error frame and counts in the error counters of every node that saw it.
 //!
 //! Deliberately absent: overload frames, propagation delay, clock tolerance, and the superposition of
 //! error flags bit by bit; each is far below what a drive or a master can notice.

@@ -27,7 +27,7 @@ function aboutOf({ name, notes = "", model = "", parameters = {}, zero_s, column
   return `capture ${JSON.stringify({ name, notes, model, trigger_s: zero_s === first_s ? null : zero_s, parameters })}`;
 }
 
-/** What such a mark says; an empty object where it is none, or cannot be read. */
+/** What such a mark says; an empty object of another mark, or one that cannot be read. */
 function readAbout(text) {
   try {
     return text.startsWith(ABOUT) ? JSON.parse(text.slice(ABOUT.length - 1)) : {};

@@ -73,7 +73,7 @@ test("it is said within which limits it was, and what is as it was or is not", (
   assert.match(remarkOf(answer({ lacks: ["it was stopped"] })), /own ramps\. it was stopped$/);
 });
 
-test("each run is a capture of the scope with the times of the bus; one without readings is none", () => {
+test("each run is a capture of the scope with the times of the bus; one without readings is left out", () => {
   const [one, ...none] = capturesOf(answer(), { id: () => "a", now: new Date("2026-01-02T03:04:05Z") });
   assert.deepEqual([none, one.zero_s, one.columns[0].label], [[], 100, "Speed"]);
   assert.ok(one.name.endsWith(" steps 1"), one.name);

@@ -32,8 +32,8 @@ impl AnyBus {
     /// True if the bus has a filter of its own and does so: a CAN interface of Linux, up to 512 identifiers. Any other bus gives
     /// all frames as before. Frames that waited already still come, and notes always.
     ///
-    /// For who listens to little of a busy bus. A master needs all frames: nodes that it does not know yet, and PDOs whose
-    /// identifiers anybody may change.
+    /// For callers that listen to little of a busy bus. A master needs all frames: nodes that it does not know yet, and PDOs whose
+    /// identifiers another program may change.
     pub fn hear_only(&mut self, ids: &[CanId]) -> Result<bool, BusError> {
         match &mut self.0 {
             #[cfg(target_os = "linux")]

@@ -55,7 +55,7 @@ impl Datagrams {
         self.waiting.push_back(received.into());
     }
 
-    /// Notes that the last datagram, or the rest of it, is none of the protocol.
+    /// Notes that the last datagram, or the rest of it, does not follow the protocol.
     pub(crate) fn push_malformed(&mut self, reason: String) {
         let shown = &self.datagram()[..self.received.min(SHOWN_LENGTH)];
         let text = shown.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");

@@ -39,7 +39,7 @@ struct Conversation {
 
 impl Hosted {
     /// A host on a network that the caller runs, with the frames that have passed it; no page yet.
-    pub(crate) fn new(network: Network, setting: Setting, passed: Passed) -> Self {
+    pub(crate) fn new(network: Network, setting: Setting, passed: PassedFrames) -> Self {
         let (host, handle) = Host::new(network, setting);
         let hosting = Task::new(boxed(host.run(move || passed.lock().pop_front())));
         Self { handle, hosting, conversation: None, sent: Vec::new() }
@@ -111,15 +111,15 @@ fn boxed(future: impl Future<Output = ()> + 'static) -> Pin<Box<dyn Future<Outpu
 
 /// The frames that have passed the master since the host has taken them.
 #[derive(Clone, Default)]
-pub(crate) struct Passed(Arc<Mutex<VecDeque<BusFrame>>>);
+pub(crate) struct PassedFrames(Arc<Mutex<VecDeque<BusFrame>>>);
 
-impl Passed {
+impl PassedFrames {
     fn lock(&self) -> MutexGuard<'_, VecDeque<BusFrame>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Listen for Passed {
+impl Listen for PassedFrames {
     fn hear(&mut self, passed: BusFrame) {
         self.lock().push_back(passed);
     }

@@ -15,7 +15,7 @@ use sim::command::{self, Service, perform};
 use words::document::BadFile;
 use words::models::with_files;
 
-use crate::hosted::{Hosted, Passed};
+use crate::hosted::{Hosted, PassedFrames};
 use crate::requests::{Request, Response};
 
 /// Longest wait for each answer of a node: virtual drives answer within some milliseconds.
@@ -75,7 +75,7 @@ impl HostedWorld {
         let mut world = machine.build()?;
         let network = Network::new();
         network.set_models(with_files(machine.models().map(|(_, model)| model)));
-        let passed = Passed::default();
+        let passed = PassedFrames::default();
         world.add_station(Tap::new(network.clone(), passed.clone()));
         world.run_for(BOOT);
         let (door, asks) = world_door(Some(world.live_values()));

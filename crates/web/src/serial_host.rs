@@ -19,7 +19,7 @@ use master::Network;
 use sim::task::Task;
 use slcan::{Client, Event, Status};
 
-use crate::hosted::{Hosted, Passed};
+use crate::hosted::{Hosted, PassedFrames};
 use crate::hosted_world::Failed;
 use crate::requests::{Request, Response, respond_without_host};
 
@@ -69,8 +69,8 @@ enum Leave {
 /// The host, its page, and the client of the adapter.
 pub struct SerialHost {
     network: Network,
-    station: Tap<Network, Passed>,
-    passed: Passed,
+    station: Tap<Network, PassedFrames>,
+    passed: PassedFrames,
     setting: Setting,
     wire: Wire,
     bitrate: Bitrate,
@@ -105,7 +105,7 @@ impl SerialHost {
             let known = "10k, 20k, 50k, 100k, 125k, 250k, 500k, 800k and 1M";
             return Err(Failed::new("usage", format!("slcan cannot select {bitrate}; it knows {known}")));
         }
-        let (network, passed, wire) = (Network::new(), Passed::default(), Wire::default());
+        let (network, passed, wire) = (Network::new(), PassedFrames::default(), Wire::default());
         let setting = Setting {
             bus: name.into(),
             bitrate: Some(bitrate),

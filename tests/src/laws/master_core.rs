@@ -66,7 +66,7 @@ pub(super) fn master_core(data: &[u8]) {
     end(&mut core, &mut open, now);
 }
 
-/// The command that a chunk asks for, if it is none of a frame, of time alone, or of a value for an RPDO.
+/// The command that a chunk asks for, unless it is a frame, time alone, or a value for an RPDO.
 fn command(core: &mut Core, chunk: &[u8]) -> Option<Command> {
     let byte = |at: usize| chunk.get(at).copied().unwrap_or(0);
     let node = NodeId::new(1 + byte(2) % 2)?;

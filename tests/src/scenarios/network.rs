@@ -3,7 +3,7 @@
 use crate::bench::{Bench, Subject, assert_within};
 use crate::power_states::PowerSubject;
 
-/// 7.2.8.2: node 0 is all nodes; a command that is cut short or not defined is none.
+/// 7.2.8.2: node 0 is all nodes; a command that is cut short or not defined has no effect.
 pub fn commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not<S: Subject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 20);

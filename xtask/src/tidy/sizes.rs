@@ -22,6 +22,25 @@ pub(super) fn files(source: &Source) -> Vec<Finding> {
     }]
 }
 
+/// Pages that a person reads before anything else, and how long they may be.
+const PAGES: [(&str, usize); 2] = [("README.md", 120), ("CHANGELOG.md", 149)];
+
+/// A first page that has grown.
+pub(super) fn pages(path: &str, text: &str) -> Vec<Finding> {
+    let lines = text.lines().count();
+    let Some((_, most)) = PAGES.into_iter().find(|(page, most)| *page == path && lines > *most) else {
+        return Vec::new();
+    };
+    vec![Finding {
+        path: path.to_owned(),
+        line: most + 1,
+        rule: "page_size",
+        what: format!("{lines} lines (more than {most})"),
+        why: "who meets the project reads it whole",
+        remedy: "move what is for a later day to docs, or shorten it",
+    }]
+}
+
 /// Functions that are longer than a screen, tests included.
 pub(super) fn functions(source: &Source) -> Vec<Finding> {
     let too_long = |function: &Function| function.lines > FUNCTION_LINES;
@@ -82,6 +101,16 @@ mod tests {
     fn a_long_file_is_found() {
         assert_eq!(files(&Source::new("a.rs", &"\n".repeat(600))), []);
         assert_eq!(files(&Source::new("a.rs", &"\n".repeat(601))).len(), 1);
+    }
+
+    #[test]
+    fn a_first_page_that_has_grown_is_found() {
+        for (page, most) in PAGES {
+            assert_eq!(pages(page, &"x\n".repeat(most)), []);
+            let found = pages(page, &"x\n".repeat(most + 1));
+            assert_eq!((found.len(), found[0].line), (1, most + 1));
+        }
+        assert_eq!(pages("docs/README.md", &"x\n".repeat(1000)), []);
     }
 
     #[test]

@@ -52,6 +52,28 @@ const HABITS: &[Habit] = &[
         remedy: "name it (the caller, another master, no node), or use the passive",
     },
     Habit {
+        // `None` of Rust and Python is a name.
+        phrases: &["is none", "are none"],
+        is_fine: |before, _, _| before == "there",
+        why: "it reads as a translation",
+        remedy: "write \"is not ...\", \"is invalid\", \"has no effect\" or \"is zero\"",
+    },
+    Habit {
+        phrases: &["are no"],
+        // As of "is no".
+        is_fine: |before, after, further| {
+            before == "there" || ["longer", "more", "less"].contains(&after) || further == "than"
+        },
+        why: "it reads as a translation",
+        remedy: "write \"are not\"",
+    },
+    Habit {
+        phrases: &["anybody", "everybody", "anybody's", "everybody's"],
+        is_fine: NEVER_FINE,
+        why: "it leaves open which program, device or person is meant",
+        remedy: "name it (every node, each client, another program), or use the passive",
+    },
+    Habit {
         phrases: &["says so"],
         is_fine: NEVER_FINE,
         why: "it leaves open where and in what form",
@@ -100,7 +122,7 @@ fn finding(path: &str, habit: &Habit, phrase: &str, words: &[Word], at: usize) -
 }
 
 struct Word {
-    /// In small letters.
+    /// In small letters, but for the name `None`.
     text: String,
     line: usize,
     /// Nothing but blanks, and the marks of comments and of a string's broken line, is between it and the word before.
@@ -120,7 +142,7 @@ fn words(text: &str) -> Vec<Word> {
             let between =
                 if is_first { gap[..begin].trim_start_matches([' ', '/', '!', '*', '#']) } else { &gap[..begin] };
             words.push(Word {
-                text: rest[..end].to_lowercase(),
+                text: if &rest[..end] == "None" { "None".to_owned() } else { rest[..end].to_lowercase() },
                 line: number + 1,
                 follows: !words.is_empty() && between.trim().is_empty(),
                 is_quoted: gap[..begin].ends_with(['"', '`']) && rest[end..].starts_with(['"', '`']),
@@ -192,6 +214,11 @@ mod tests {
             "model.fault_reported_by(code)",
             "he_told",
             "foretold",
+            "if there is none, there are none",
+            "if value is None: return",
+            "there are no drives",
+            "they are no longer sent, and are no larger than before",
+            ".of_kind(\"everybody\")",
             "leave out, go away",
             ".of_kind(\"nobody\")",
             "| `no_answer`, `nobody` |",

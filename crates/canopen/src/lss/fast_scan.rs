@@ -2,8 +2,8 @@
 
 use super::wire::{Address, Request};
 
-/// Asks whether anybody without a node-ID is there. Source: CiA 305, 6.5.3.
-const ANYBODY: u8 = 128;
+/// Asks whether there is a device without a node-ID. Source: CiA 305, 6.5.3.
+const PRESENCE: u8 = 128;
 const HIGHEST_BIT: u8 = 31;
 
 /// The search for one device of which nothing is known, bit by bit (CiA 305, 6.5.3): the smallest address that is there.
@@ -17,7 +17,7 @@ pub struct FastScan {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    Anybody,
+    Presence,
     Bit {
         part: u8,
         bit: u8,
@@ -40,14 +40,14 @@ impl Default for FastScan {
 impl FastScan {
     /// A search that begins.
     pub const fn new() -> Self {
-        Self { address: Address { numbers: [0; 4] }, step: Step::Anybody }
+        Self { address: Address { numbers: [0; 4] }, step: Step::Presence }
     }
 
     /// The next question; `None` once it is over.
     pub fn next(&self) -> Option<Request> {
         let number = |part: u8| self.address.numbers[usize::from(part & 3)];
         match self.step {
-            Step::Anybody => Some(Request::FastScan { number: 0, bit: ANYBODY, part: 0, next: 0 }),
+            Step::Presence => Some(Request::FastScan { number: 0, bit: PRESENCE, part: 0, next: 0 }),
             Step::Bit { part, bit } => Some(Request::FastScan { number: number(part), bit, part, next: part }),
             Step::Confirm { part } => {
                 Some(Request::FastScan { number: number(part), bit: 0, part, next: (part + 1) & 3 })
@@ -59,7 +59,7 @@ impl FastScan {
     /// Whether a slave has answered.
     pub fn note(&mut self, identified: bool) {
         self.step = match self.step {
-            Step::Anybody if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
+            Step::Presence if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
             Step::Bit { part, bit } => {
                 if !identified {
                     // No slave has 0 there, so all that are there have 1.
@@ -69,7 +69,7 @@ impl FastScan {
             }
             Step::Confirm { part: 3 } if identified => Step::Found,
             Step::Confirm { part } if identified => Step::Bit { part: part + 1, bit: HIGHEST_BIT },
-            Step::Anybody | Step::Confirm { .. } | Step::Unanswered => Step::Unanswered,
+            Step::Presence | Step::Confirm { .. } | Step::Unanswered => Step::Unanswered,
             Step::Found => Step::Found,
         };
     }

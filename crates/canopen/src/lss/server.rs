@@ -178,7 +178,7 @@ mod tests {
             }
             (scan.found(), asked)
         };
-        // One question whether anybody is there, then 32 bits and a confirmation for each number (CiA 305, 6.5.3).
+        // One question whether there is a device, then 32 bits and a confirmation for each number (CiA 305, 6.5.3).
         assert_eq!(found(), (Some(ADDRESS), 1 + 4 * 33));
         assert_eq!(found(), (Some(other), 1 + 4 * 33));
         assert_eq!(found(), (None, 1));

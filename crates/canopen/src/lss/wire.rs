@@ -92,15 +92,15 @@ pub enum Request {
     Inquire(Part),
     /// The node-ID. Clause 6.4.2.
     InquireNodeId,
-    /// Is anybody without a node-ID? Clause 6.5.2.
+    /// Is there a device without a node-ID? Clause 6.5.2.
     IdentifyNonConfigured,
-    /// Is anybody there within all six bounds, with a node-ID or without? The sixth is answered. Clause 6.5.1.
+    /// Is there a device within all six bounds, with a node-ID or without? The sixth is answered. Clause 6.5.1.
     Identify(Bound, u32),
-    /// Is anybody whose number has these bits, above `bit`? Clause 6.5.3.
+    /// Is there a device whose number has these bits, above `bit`? Clause 6.5.3.
     FastScan {
         /// What is compared.
         number: u32,
-        /// The lowest bit that counts; 128 asks whether anybody is there.
+        /// The lowest bit that counts; 128 asks whether there is any device.
         bit: u8,
         /// Which number, 0 to 3.
         part: u8,
@@ -186,7 +186,7 @@ fn with_number(specifier: u8, number: u32) -> [u8; LENGTH] {
 }
 
 impl Request {
-    /// Reads a frame; `None` if it is none of an LSS master.
+    /// Reads a frame; `None` if it is not of an LSS master.
     pub fn parse(frame: &Frame) -> Option<Self> {
         let raw = payload(frame, LSS_MASTER)?;
         Some(match raw[0] {
@@ -259,7 +259,7 @@ impl Request {
 }
 
 impl Reply {
-    /// Reads a frame; `None` if it is none of an LSS slave.
+    /// Reads a frame; `None` if it is not of an LSS slave.
     pub fn parse(frame: &Frame) -> Option<Self> {
         let raw = payload(frame, LSS_SLAVE)?;
         let outcome = Outcome { code: raw[1], specific: raw[2] };
@@ -296,7 +296,7 @@ impl Reply {
     }
 }
 
-/// The eight bytes of a data frame with this identifier. Shorter ones are none (CiA 305, 7.2).
+/// The eight bytes of a data frame with this identifier. Shorter ones are not LSS (CiA 305, 7.2).
 fn payload(frame: &Frame, id: CanId) -> Option<&[u8; LENGTH]> {
     (frame.id() == id && !frame.is_remote() && frame.data().len() == LENGTH).then(|| frame.padded())
 }

@@ -4,8 +4,8 @@ use core::fmt;
 
 use super::wire::{Address, BIT_RATES_KBIT, Bound, Outcome, Part, Reply, Request, UNCONFIGURED};
 
-/// The lowest bit of a fastscan's question that asks whether anybody is there (CiA 305, 6.5.3).
-const ANYBODY: u8 = 128;
+/// The lowest bit of a fastscan's question that asks whether there is a device (CiA 305, 6.5.3).
+const PRESENCE: u8 = 128;
 
 /// Vendor-ID, product code, revision and serial number in hexadecimal: `100:1:0:2A`.
 impl fmt::Display for Address {
@@ -74,7 +74,7 @@ impl fmt::Display for Request {
             Self::ConfigureBitRate { table: 0, index } => {
                 match BIT_RATES_KBIT.get(usize::from(index)).copied().flatten() {
                     Some(rate) => write!(f, "configure bit rate {rate} kbit/s"),
-                    None => write!(f, "configure bit rate, index {index}, which is none"),
+                    None => write!(f, "configure bit rate, invalid index {index}"),
                 }
             }
             Self::ConfigureBitRate { table, index } => write!(f, "configure bit rate, index {index} of table {table}"),
@@ -84,11 +84,11 @@ impl fmt::Display for Request {
             Self::InquireNodeId => f.write_str("inquire node-ID"),
             Self::IdentifyNonConfigured => f.write_str("identify devices without a node-ID"),
             Self::Identify(bound, number) => write!(f, "identify: {bound} {number:X}h"),
-            Self::FastScan { bit: ANYBODY, .. } => f.write_str("fastscan: is anybody without a node-ID there?"),
+            Self::FastScan { bit: PRESENCE, .. } => f.write_str("fastscan: is there a device without a node-ID?"),
             Self::FastScan { number, bit, part, next } => {
                 match Part::ALL.get(usize::from(part)) {
                     Some(part) => write!(f, "fastscan: {part} {number:X}h from bit {bit} up")?,
-                    None => write!(f, "fastscan: number {part}, which is none")?,
+                    None => write!(f, "fastscan: invalid number {part}")?,
                 }
                 match Part::ALL.get(usize::from(next)).filter(|_| next != part) {
                     Some(next) => write!(f, ", next {next}"),
@@ -141,10 +141,10 @@ mod tests {
         assert_eq!(request("7E5#1105000000000000"), "LSS configure node-ID 5");
         assert_eq!(request("7E5#11FF000000000000"), "LSS configure no node-ID");
         assert_eq!(request("7E5#1300020000000000"), "LSS configure bit rate 500 kbit/s");
-        assert_eq!(request("7E5#1300050000000000"), "LSS configure bit rate, index 5, which is none");
+        assert_eq!(request("7E5#1300050000000000"), "LSS configure bit rate, invalid index 5");
         assert_eq!(request("7E5#15E8030000000000"), "LSS activate bit rate, silent for 1000 ms before and after");
         assert_eq!(request("7E5#4B2A000000000000"), "LSS identify: serial number to 2Ah");
-        assert_eq!(request("7E5#5100000000800000"), "LSS fastscan: is anybody without a node-ID there?");
+        assert_eq!(request("7E5#5100000000800000"), "LSS fastscan: is there a device without a node-ID?");
         assert_eq!(request("7E5#5100010000000001"), "LSS fastscan: vendor-ID 100h from bit 0 up, next product code");
         assert_eq!(request("7E5#C800000000000000"), "LSS command specifier C8h");
         assert_eq!(reply("7E4#4400000000000000"), "LSS reply: selected");

@@ -345,7 +345,7 @@ impl Entry {
     /// Checks a number against listed values and limits, those at a resolution of 1.
     ///
     /// # Errors
-    /// [`AbortCode::INVALID_VALUE`] if values are listed and this is none of them, [`AbortCode::VALUE_TOO_HIGH`]
+    /// [`AbortCode::INVALID_VALUE`] if values are listed and this is not among them, [`AbortCode::VALUE_TOO_HIGH`]
     /// and [`AbortCode::VALUE_TOO_LOW`] outside the limits.
     pub fn check_value(&self, value: i64) -> Result<(), AbortCode> {
         if !self.values.is_empty() && self.meaning(value).is_none() {

@@ -31,7 +31,7 @@ pub(crate) fn log_path(text: &str) -> Result<LogPath, String> {
             let extension = extension.unwrap_or_default();
             let extension = extension.to_string_lossy();
             return Err(format!(
-                "no form of log has the extension .{extension}; a log is written as {}",
+                ".{extension} is not a log format; a log is written as {}",
                 Format::written_extensions()
             ));
         }

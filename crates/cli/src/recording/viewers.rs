@@ -10,7 +10,7 @@ use crate::failure::Failure;
 /// Where viewers connect, and which.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct ViewerOptions {
-    /// Show the run live to viewers, e.g. Foxglove, at this address
+    /// Stream the run to viewers such as Foxglove; listen at this address
     ///
     /// Signals, frames and events for Foxglove, Lichtblick and PlotJuggler, e.g. at 127.0.0.1:8765; a port alone is one
     /// of this machine, 0 a free one.

@@ -32,7 +32,7 @@ fn a_device_without_a_node_id_is_found_and_becomes_a_node() {
     // It has a node-ID now, and the ZLAC8030L has no LSS.
     let absent = refused(&bus, &["lss", "scan"]).out;
     assert!(
-        absent.contains("no device without a node-ID") && absent.contains("by their manuals zlac8030l"),
+        absent.contains("no device without a node-ID") && absent.contains("according to their manuals, zlac8030l"),
         "{absent}"
     );
 }
@@ -62,7 +62,7 @@ fn what_is_no_node_id_or_bit_rate_is_refused_and_a_stranger_is_not_configured() 
     let stranger = refused(&bus, &["lss", "set", "0:192:10000:2", "--node-id", "9"]);
     assert!(stranger.out.contains("0:192:10000:2 does not answer LSS"), "{}", stranger.out);
     assert_eq!(bus.json(&["read", "4", "1018:04"])["value"], json!(1));
-    // 100 kbit/s is none of CiA 305, table 1.
+    // 100 kbit/s is not in CiA 305, table 1.
     for wrong in [&["--node-id", "128"], &["--node-id", "0"], &["--bitrate", "100k"]] {
         let refused = refused(&bus, &[&["lss", "set", ADDRESS][..], wrong].concat());
         assert_eq!(refused.status, Some(2), "{wrong:?}");

@@ -58,7 +58,7 @@ fn the_dcf_of_a_manager_says_who_is_booted_and_as_what() {
     let text = ferrodrive(&["boot", file]).out;
     assert!(text.contains("1018h:01") && text.contains(&format!("{:X}", vendor + 1)), "{text}");
 
-    // A configuration that is not there, and one that is cut short, before anybody is asked.
+    // A configuration that is not there, and one that is cut short, before any node is asked.
     std::fs::write(&path, manager(vendor, "nowhere.bin")).expect("a DCF");
     let ended = ferrodrive(&["boot", file]);
     assert_eq!(ended.status, Some(1));

@@ -124,6 +124,38 @@ fn an_error_behind_lines_of_a_log_says_that_they_are_not_all() {
     }
 }
 
+/// Of several objects as of one: which it was, and the node's abort code. CiA 301, 7.2.4.3.17: 0602 0000h, 0609 0011h.
+#[test]
+fn an_error_behind_objects_that_were_read_says_which_it_was_and_that_they_are_not_all() {
+    for (line, printed, object, code) in [
+        ("read 4 6064 5FFF", 1, "5FFFh:00", 0x0602_0000),
+        ("read 4 1018:* 5FFF 6064", 4, "5FFFh:00", 0x0602_0000),
+        ("read 4 6064 1018:9", 1, "1018h:09", 0x0609_0011),
+        ("read 4 5FFF 6064", 0, "5FFFh:00", 0x0602_0000),
+        ("read 4 1018:7..9", 0, "1018h:07", 0x0609_0011),
+    ] {
+        let words: Vec<_> = ["--json"].into_iter().chain(line.split(' ')).collect();
+        let ended = ferrodrive(&words);
+        let lines: Vec<Value> = ended.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let (last, before) = lines.split_last().unwrap();
+        assert_eq!((ended.status, before.len()), (Some(1), printed), "{line}: {}", ended.out);
+        assert!(before.iter().all(|value| value["ok"] == true), "{}", ended.out);
+        let partial = if printed > 0 { json!(true) } else { Value::Null };
+        let error = &last["error"];
+        assert_eq!(
+            (&last["ok"], &last["partial"], &error["kind"]),
+            (&json!(false), &partial, &json!("aborted")),
+            "{last}"
+        );
+        assert_eq!(
+            (&error["node"], &error["object"], &error["abort"]),
+            (&json!(4), &json!(object), &json!(code)),
+            "{last}"
+        );
+        assert!(error["next"].is_string(), "{last}");
+    }
+}
+
 #[test]
 fn a_run_that_fails_has_its_error_where_other_commands_have_it() {
     const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/scenarios/homing_stuck_switch.toml");

@@ -16,7 +16,7 @@ fn a_backup_in_any_form_is_what_the_node_has() {
         let again = ferrodrive(&["params", "backup", "4", "-o", &file]);
         assert!(again.status == Some(1) && again.err.contains("already exists"), "{}", again.err);
     }
-    // One without an extension that says what it is, before anybody is asked.
+    // One without an extension that says what it is, before any node is asked.
     let ended = ferrodrive(&["params", "backup", "4", "-o", &folder.path("wheel.txt")]);
     assert!(ended.status == Some(2) && ended.err.contains(".toml"), "{}", ended.err);
 }

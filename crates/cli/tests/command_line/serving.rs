@@ -161,7 +161,7 @@ fn what_is_no_terminal_is_told_what_to_use() {
     assert!(ended.err.contains("not a terminal") && ended.err.contains("ferrodrive watch"), "{}", ended.err);
     let json = ferrodrive(&["--json", "top"]);
     assert_eq!(json.status, Some(2));
-    assert!(format!("{}{}", json.out, json.err).contains("for programs"), "{}{}", json.out, json.err);
+    assert!(format!("{}{}", json.out, json.err).contains("--json has no effect on top"), "{}{}", json.out, json.err);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn a_gateway_that_cannot_serve_says_why() {
     let place = taken.local_addr().unwrap().to_string();
     let second = ferrodrive(&["--bus", &bus, "gateway", "--listen", &place]);
     assert!(second.status == Some(1) && second.err.contains("cannot listen at"), "{}", second.err);
-    // An address of no machine (RFC 5737), and a word that is none.
+    // An address of no machine (RFC 5737), and a word that is not an address.
     let nowhere = ferrodrive(&["--bus", &bus, "gateway", "--listen", "192.0.2.1:1"]);
     assert!(nowhere.status == Some(1) && nowhere.err.contains("cannot listen at 192.0.2.1:1"), "{}", nowhere.err);
     let word = ferrodrive(&["--bus", &bus, "gateway", "--listen", "here"]);

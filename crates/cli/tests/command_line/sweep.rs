@@ -109,7 +109,7 @@ fn what_cannot_be_gone_on_with_or_merged_is_refused_with_its_place_and_stays_as_
     };
     ferrodrive(&[&sweep[..], &["-o", &results]].concat());
     let written = read(&results);
-    refused(&["-o", &results], 1, ["already exists", "--resume goes on with it"]);
+    refused(&["-o", &results], 1, ["already exists", "--resume continues it"]);
     refused(&["--set", "volts=24", "-o", &results, "--resume"], 1, ["line 1: the parameters", "give the same --set"]);
     refused(&["--shard", "1/2", "-o", &results, "--resume"], 1, ["line 1: it has shard 1/1", "give --shard 1/1"]);
     std::fs::write(&scenario, RANDOM.replace("400ms", "500ms")).unwrap();

@@ -424,7 +424,10 @@ fn a_log_of_no_known_form_is_neither_written_nor_read() {
     let folder = scratch("no_known_form");
     let path = |name: &str| folder.join(name).display().to_string();
     std::fs::write(path("a.log"), "(0.000000) can0 704#05\n").unwrap();
-    refused(&["convert", &path("a.log"), &path("b.xyz")], &["no form of log", ".xyz", ".log (candump)", ".blf (BLF)"]);
+    refused(
+        &["convert", &path("a.log"), &path("b.xyz")],
+        &[".xyz is not a log format", ".log (candump)", ".blf (BLF)"],
+    );
     assert!(!folder.join("b.xyz").exists());
     // MCAP begins with its name between two bytes that no text has.
     std::fs::write(path("run.mcap"), b"\x89MCAP0\r\n\x01\x26\0\0\0\0\0\0\0").unwrap();

@@ -19,7 +19,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("OD 06", "Values at the limits are taken, those beyond refused", "CiA 301, 7.4.6", [], [], all_limits),
     case!("OD 07", "Every object as its access says, in operational", "CiA 301, 7.4.6", [], ["sub_index_count"], access_all_operational),
     case!("OD 08", "Constants are those of the description", "CiA 301, 7.4.2", [], [], constants),
-    case!("OD 09", "What is read is taken back", "CiA 301, 7.4.6", [], [], write_back),
+    case!("OD 09", "A value that was read can be written back", "CiA 301, 7.4.6", [], [], write_back),
     case!("OD 51", "Sub-index 00h is the highest sub-index", "CiA 301, 7.4.7", [], ["sub_index_count", "sub_index_zero"], counts),
     case!("OD 52", "1018h has the numbers of the description", "CiA 301, 7.5.2.19", [], [], identity),
     case!("OD 53", "Objects that the description does not have are refused", "CiA 301, 7.2.4.3.17", [], [], absent),

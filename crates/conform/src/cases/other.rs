@@ -22,7 +22,7 @@ pub(crate) const CASES: &[Case] = &[
     case!("OTHER 08", "Refuse the signature backwards for 1011h:02", "CiA 301, 7.5.2.14", [Need::Sub(0x1011, 2)], [], |bench| wrong_signature(bench, 0x1011, 2, *b"daol")),
     case!("OTHER 09", "1020h is kept by save, and is 0 once another command changes what is saved", "CiA 301, 7.5.2.23", [Need::Index(0x1020), STORE, Need::Store], [], configuration_date),
     case!("OTHER 10", "Refuse identifiers that nothing may use", "CiA 301, 7.3.5", [], [], restricted),
-    case!("OTHER 51", "1010h and 1011h say what they do with bits 0 and 1, and nothing else", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
+    case!("OTHER 51", "1010h and 1011h report capabilities in bits 0 and 1 only", "CiA 301, 7.5.2.13", [Need::Sub(0x1010, 1)], [], says_how),
     case!("OTHER 52", "Saved values are there after a reset, and delivered ones after a restore", "CiA 301, 7.5.2.14", [STORE, Need::Writable(0x1017), Need::Store], [], save_and_reset),
 ];
 

@@ -228,7 +228,7 @@ async fn unmappable_into_tpdo(bench: &mut Bench) -> Verdict {
 async fn dummy(bench: &mut Bench) -> Verdict {
     // UNSIGNED8, 0005h.
     match map_one(bench, 0x1400, 0x0005_0008).await? {
-        Ok(()) => Ok("0005h, eight bits of nothing, is mapped".into()),
+        Ok(()) => Ok("dummy 0005h (8 bits) is mapped".into()),
         Err(code @ (AbortCode::NO_SUCH_OBJECT | AbortCode::NOT_MAPPABLE)) => {
             not_applicable!("the device has no dummy mapping: {code}")
         }

@@ -67,7 +67,7 @@ impl Estop {
     pub async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
         let models: BTreeMap<_, _> = context.stated_models();
         let stopped = match context.in_control() {
-            // Who sees a danger stops what moves; the state of the bus is for who commands it.
+            // A page that sees a danger stops what moves; the state of the bus is for the one that commands it.
             Some(false) => {
                 context.note(
                     "without control: each drive gets its quick stop, and the NMT states of the nodes stay as they are. Where another \
@@ -205,7 +205,7 @@ impl StopReport {
         let line = |axis: &AxisReport| {
             let model = axis.model.map(|model| format!(" ({model})")).unwrap_or_default();
             let said = match (axis.after_ms, axis.way) {
-                (Some(ms), Some(way)) => format!("stands, seen after {:.2} s: {}", ms as f64 / 1e3, in_words(way)),
+                (Some(ms), Some(way)) => format!("at standstill after {:.2} s: {}", ms as f64 / 1e3, in_words(way)),
                 _ => paint.bad("may still be moving"),
             };
             format!("{}{}: {said}", axis.name(), plain(&model))
@@ -219,9 +219,9 @@ fn in_words(way: &'static str) -> String {
     if way == StopWay::QuickStop.words() {
         "quick stop, its motor holds".to_owned()
     } else if way == StopWay::NoPower.words() {
-        "its motor has no power; a load may move it".to_owned()
+        "motor unpowered; a load may still turn it".to_owned()
     } else if way == StopWay::Fault.words() {
-        "a fault has removed power from its motor; a load may move it".to_owned()
+        "motor unpowered by a fault; a load may still turn it".to_owned()
     } else {
         "by its ramp; it stays enabled if it was".to_owned()
     }

@@ -43,7 +43,8 @@ impl Read {
     /// Reads, decodes and shows one after the other.
     ///
     /// # Errors
-    /// What `show` fails with; the node has nothing of a selection; an error of the master.
+    /// What `show` fails with; the node has nothing of a selection; an error of the master. Where something was shown before, it
+    /// is said to be a part.
     pub async fn run(
         &self,
         context: &Context,
@@ -52,23 +53,43 @@ impl Read {
         if let Some(object) = self.one() {
             return show(&self.read_one(context, object).await?.0);
         }
+        let mut partial = false;
+        let show = |report: &ObjectReport| {
+            show(report)?;
+            partial = true;
+            Ok(())
+        };
+        self.run_several(context, show).await.map_err(|failure| Failure { partial, ..failure })
+    }
+
+    async fn run_several(
+        &self,
+        context: &Context,
+        mut show: impl FnMut(&ObjectReport) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let drive = context.drive(self.node).await?;
         for selection in &self.objects {
             let mut found = 0;
             let mut last = None;
+            let mut absent = None;
             for mux in self.candidates(&drive, selection)? {
                 // Of an index that is not there no other sub-index is either.
                 if mux.sub_index > 0 && last == Some((mux.index, false)) {
                     continue;
                 }
                 context.show(format!("node {}: {mux}", self.node));
-                let (reports, is_there) = self.all_of(&drive, mux).await?;
-                last = Some((mux.index, is_there));
-                found += reports.len();
-                reports.iter().try_for_each(&mut show)?;
+                let there = self.all_of(&drive, mux).await?;
+                last = Some((mux.index, there.is_ok()));
+                match there {
+                    Ok(reports) => {
+                        found += reports.len();
+                        reports.iter().try_for_each(&mut show)?;
+                    }
+                    Err(error) => absent = absent.or(Some(error)),
+                }
             }
             if found == 0 {
-                return Err(self.nothing(selection));
+                return Err(self.nothing(selection, absent));
             }
         }
         Ok(())
@@ -116,25 +137,28 @@ impl Read {
         })
     }
 
-    /// The object, and where no table lists sub-indices those that follow from sub-index 0. False if it is not there.
-    async fn all_of(&self, drive: &Drive, mux: Mux) -> Result<(Vec<ObjectReport>, bool), Failure> {
-        let Some(first) = self.look(drive, mux).await? else { return Ok((Vec::new(), false)) };
+    /// The object, and where no table lists sub-indices those that follow from sub-index 0; or the node's answer that it is not there.
+    async fn all_of(&self, drive: &Drive, mux: Mux) -> Result<Result<Vec<ObjectReport>, Error>, Failure> {
+        let first = match self.look(drive, mux).await? {
+            Ok(first) => first,
+            Err(absent) => return Ok(Err(absent)),
+        };
         let is_listed = drive.description().is_some_and(|model| model.row(mux).is_some());
         let count = first.number().filter(|_| mux.sub_index == 0 && !is_listed).unwrap_or(0);
         let mut reports = vec![first];
         for sub_index in 1..=u8::try_from(count).unwrap_or(0).min(254) {
             match self.look(drive, Mux::new(mux.index, sub_index)).await? {
-                Some(report) => reports.push(report),
+                Ok(report) => reports.push(report),
                 // The value of a variable is not a count of sub-indices.
-                None if sub_index == 1 => break,
-                None => {}
+                Err(_) if sub_index == 1 => break,
+                Err(_) => {}
             }
         }
-        Ok((reports, true))
+        Ok(Ok(reports))
     }
 
-    /// Reads an object; `None` if there is none. A refusal is something to show.
-    async fn look(&self, drive: &Drive, mux: Mux) -> Result<Option<ObjectReport>, Failure> {
+    /// Reads an object; or the node's answer that it is not there. Another refusal is something to show.
+    async fn look(&self, drive: &Drive, mux: Mux) -> Result<Result<ObjectReport, Error>, Failure> {
         let row = match drive.description() {
             Some(model) => model.row(mux),
             None => common_row(mux),
@@ -142,27 +166,33 @@ impl Read {
         match drive.node().upload(mux).await {
             Ok(payload) => {
                 let limits = moving_limits(drive, row).await?;
-                Ok(Some(ObjectReport::new(drive, mux, row, payload.as_bytes(), limits.as_ref(), false)))
+                Ok(Ok(ObjectReport::new(drive, mux, row, payload.as_bytes(), limits.as_ref(), false)))
             }
-            Err(Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => Ok(None),
+            Err(absent @ Error::Aborted { code: AbortCode::NO_SUCH_OBJECT | AbortCode::NO_SUCH_SUB_INDEX, .. }) => {
+                Ok(Err(absent))
+            }
             Err(Error::Aborted { code, .. }) => {
                 let mut report = ObjectReport::new(drive, mux, row, &[], None, false);
                 report.refused = Some(code.to_string());
-                Ok(Some(report))
+                Ok(Ok(report))
             }
             Err(error) => Err(error.into()),
         }
     }
 
-    fn nothing(&self, selection: &Selection) -> Failure {
-        let what = match selection {
-            Selection::One(_) => "it has no such object".to_owned(),
-            Selection::SubIndices(index, _) => format!("it has nothing of {index:04X}h"),
-            Selection::Indices(first, last) => format!("it has nothing from {first:04X}h to {last:04X}h"),
+    /// That a node has nothing of a selection, with its answer to the first object that was asked for.
+    fn nothing(&self, selection: &Selection, absent: Option<Error>) -> Failure {
+        let answer = absent.map(Failure::from);
+        let what = match (selection, &answer) {
+            (Selection::Indices(first, last), _) => format!("has no object from {first:04X}h to {last:04X}h"),
+            // Of one object the answer says all.
+            (_, Some(answer)) => return answer.clone(),
+            (_, None) => "has no such object".to_owned(),
         };
-        Failure::new(format!("node {}: {what}", self.node))
+        let mut failure = Failure::new(format!("node {} {what}", self.node))
             .of_kind("aborted")
-            .at_node(self.node)
-            .next(format!("ferrodrive objects {} lists what it has", self.node))
+            .next(format!("ferrodrive objects {} lists what it has", self.node));
+        failure.subject = answer.map_or(failure.subject, |answer| answer.subject);
+        failure.at_node(self.node)
     }
 }

@@ -6,7 +6,7 @@
 //! | object | delivered | one count | gives | because |
 //! |---|---|---|---|---|
 //! | 60F9h:01 | 3000 | 1/15 mA/(rad/s) | 0.2 A/(rad/s) | velocity bandwidth kp Kt/J of 590 and 230 rad/s: a fifth of the current loop's or less |
-//! | 60F9h:02 | 30 | 1 ms | 30 ms | printed as a time; seven and more of the loop's own. 2000 is none at all ("cancel integration") |
+//! | 60F9h:02 | 30 | 1 ms | 30 ms | printed as a time; seven and more of the loop's own. 2000 switches it off ("cancel integration") |
 //! | 60FBh:01 | 3000 | 0.02 1/s | 60 1/s | a quarter of the slower velocity loop |
 //! | 60FBh:02 | 0 | 1/327 V at 1000 r/min | 0 V | printed; added to the motor's voltage. Its 12 V come near the 14.1 V of the motors' own |
 

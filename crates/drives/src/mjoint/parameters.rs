@@ -57,7 +57,7 @@ pub(super) struct Parameters {
 /// What the 2 ms of mode 7 go by: 261Ch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TimeBase {
-    /// 0: the joint's own clock, apart from everybody else's.
+    /// 0: the joint's own clock, apart from those of other nodes.
     Own,
     /// Above 0: the joint's own clock, which SYNC starts over.
     Sync,

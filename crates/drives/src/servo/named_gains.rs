@@ -66,7 +66,7 @@ impl NamedGains {
             let integral_per_s = match (self.is_time, second > 0.0) {
                 (false, _) => second,
                 (true, true) => proportional / second,
-                // A time of 0 is none.
+                // A time of 0 switches it off.
                 (true, false) => 0.0,
             };
             gains.cascade.velocity = PiGains { proportional, integral_per_s };

@@ -16,7 +16,7 @@ use crate::{
 /// For whom a sheet is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flavour {
-    /// For everybody: what the device has.
+    /// For any tool: what the device has.
     #[default]
     Standard,
     /// For ros2_canopen, whose CiA 402 driver reads 6502h and 6061h from the file without asking whether they are there, and

@@ -173,7 +173,7 @@ fn pdos_that_are_counted_and_not_listed_have_the_sub_indices_that_compact_pdo_na
     assert_eq!(counting(3, 0).expect("a small file").eds.objects.len(), 1, "without it there are none");
     let eds = counting(6, 0b1_0111).expect("a small file").eds;
     let indices: Vec<u16> = eds.objects.iter().map(|object| object.index).collect();
-    // 1401h is listed without a mapping, which is none of CompactPDO's.
+    // 1401h is listed without a mapping, which does not come from CompactPDO.
     let expected = [0x1400..0x1406, 0x1600..0x1601, 0x1602..0x1606, 0x1800..0x1806, 0x1A00..0x1A06];
     assert_eq!(indices, expected.into_iter().flatten().collect::<Vec<u16>>());
     let of = |index: u16| eds.object(index).expect("it is there");

@@ -54,7 +54,7 @@ impl Reader {
         Some(number)
     }
 
-    /// A value of a type. An empty one is none.
+    /// A value of a type; an empty one counts as absent.
     pub(super) fn value(&mut self, section: Section<'_>, entry: Entry<'_>, data_type: TypeCode) -> Option<Value> {
         if entry.value.is_empty() {
             return None;

@@ -16,7 +16,7 @@ use super::quantity::{Quantity, short_names};
 pub enum Measurand {
     /// What the drive itself says.
     Object(Quantity),
-    /// What is true of a virtual drive.
+    /// A true value, from the simulation of a virtual drive.
     World(TrueValue),
 }
 

@@ -157,7 +157,7 @@ fn settling(parts: &[(f64, f64)], at_s: f64, widest: f64) -> Figure {
 }
 
 /// How far `actual` was from `demand`, which has a value at each time; a time at which one of both is not a number does not count.
-/// `None` where no time counts.
+/// `None` where there is no such time.
 pub fn following(time_s: &[f64], demand: &[f64], actual: &[f64]) -> Option<Following> {
     let errors = time_s.iter().zip(demand.iter().zip(actual)).map(|(at, (demand, actual))| (*at, demand - actual));
     let errors: Vec<(f64, f64)> = errors.filter(|(_, error)| error.is_finite()).collect();

@@ -71,7 +71,7 @@ impl SeenBy {
     pub const fn word(self) -> &'static str {
         match self {
             Self::Heartbeat => "heartbeat",
-            Self::Silence => "silence",
+            Self::Silence => "no more frames",
             Self::Nothing => "nothing",
         }
     }
@@ -288,7 +288,7 @@ impl Restorer {
     }
 }
 
-/// That not everything of a node was put back; `None` if nothing is left. How to do it later is for who reports it to say.
+/// That not everything of a node was put back; `None` if nothing is left. How to do it later is for its caller to say.
 pub fn not_put_back(node: NodeId, left: &[String]) -> Option<Failure> {
     let failure = || Failure::new(format!("node {node}: not everything was put back"));
     (!left.is_empty()).then(|| failure().of_kind("not_put_back").at_node(node))

@@ -10,7 +10,7 @@ use master::core::NodeSet;
 pub(super) struct Guards {
     /// How many clients have asked for the guard of each.
     holders: BTreeMap<NodeId, u32>,
-    /// Those that have one.
+    /// The nodes whose guard is on.
     guarded: NodeSet,
 }
 

@@ -175,7 +175,7 @@ impl BootOptions {
     pub const FORM: &str = "boot [node NODE].. [reset] [no-start]";
 
     /// Boots the nodes of a plan, and reads of those that were left as they are whether they have what is planned. No drive is armed to
-    /// stop without this master: that is for who moves it.
+    /// stop without this master: that is for the program that moves it.
     pub async fn boot(&self, network: &Network, plan: &mut BootPlan) -> BootReport {
         plan.guard = false;
         if self.reset {
@@ -210,7 +210,7 @@ impl Planned {
     /// Reads a file, by its ending; without one the bus is asked.
     ///
     /// # Errors
-    /// It is none of these, or makes no sense.
+    /// It is neither, or makes no sense.
     pub fn read(file: Option<&Path>) -> Result<Self, Failure> {
         let Some(path) = file else { return Ok(Self::Bus) };
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase());

@@ -7,9 +7,9 @@
 use std::fmt::Write as _;
 
 use can::Bitrate;
-use canopen::NodeId;
 use canopen::object::{PRODUCER_HEARTBEAT_TIME, SERIAL_NUMBER};
 use canopen::od::DefaultValue;
+use canopen::{NmtState, NodeId};
 use devices::Description;
 use devices::variant::Variant;
 use master::Network;
@@ -282,9 +282,14 @@ fn drive(text: &mut String, node: &InitNode) {
         .description
         .is_none_or(|model| model.row(PRODUCER_HEARTBEAT_TIME).is_some_and(|row| row.access.is_writable()));
     if has_heartbeat {
+        // What becomes operational by itself is left as it is by a boot-up without a reset.
+        let by_itself = node.description.is_some_and(|model| model.nmt.start_state == NmtState::Operational);
+        let boot = if by_itself { "boot --reset" } else { "boot" };
         let _ = match node.heartbeat_ms {
-            Some(ms) if ms > 0 => writeln!(text, "# As read (1017h); `boot` sets it.\n{off}heartbeat = \"{ms}ms\""),
-            Some(_) => writeln!(text, "# It sends no heartbeat (1017h is 0); `boot` sets one.\n#heartbeat = \"500ms\""),
+            Some(ms) if ms > 0 => writeln!(text, "# As read (1017h); `{boot}` sets it.\n{off}heartbeat = \"{ms}ms\""),
+            Some(_) => {
+                writeln!(text, "# It sends no heartbeat (1017h is 0); `{boot}` sets one.\n#heartbeat = \"500ms\"")
+            }
             None => writeln!(text, "# How often it is to send its heartbeat (1017h).\n#heartbeat = \"500ms\""),
         };
     }

@@ -36,15 +36,15 @@ pub fn read_machine(path: &Path) -> Result<Machine, Failure> {
 pub fn unusable(path: &Path, reason: String) -> Failure {
     // A pipe would be waited for.
     let unopened = path.is_file().then(|| std::fs::File::open(path).err()).flatten();
-    let failure = Failure::bad_file(format!("cannot use the machine file {}", path.display())).because(reason);
-    failure.next(remedy(unopened.map(|error| error.kind())))
+    let next = remedy(unopened.map(|error| error.kind()), &reason);
+    Failure::bad_file(format!("cannot use the machine file {}", path.display())).because(reason).next(next)
 }
 
 /// What to do about a machine file, by why it could not be opened.
-fn remedy(unopened: Option<ErrorKind>) -> String {
+fn remedy(unopened: Option<ErrorKind>, reason: &str) -> String {
     match unopened {
         Some(ErrorKind::PermissionDenied) => "give this account the right to read it".to_owned(),
-        _ => file::example(),
+        _ => file::example(reason),
     }
 }
 

@@ -257,7 +257,7 @@ fn a_shaft_that_does_not_come_to_the_end_of_its_path_is_named() {
             };
             assert_eq!(answer.error_kind(), "group");
             let text = answer.json();
-            assert!(text.contains("axis 1, node 4, is 2") && text.contains("deg from where it was led"), "{text}");
+            assert!(text.contains("axis 1, node 4, is 2") && text.contains("deg from its set-point"), "{text}");
             assert_ne!(stage.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
         },
         |_| {},

@@ -68,6 +68,23 @@ fn with_examples(toml: &str) -> String {
     toml.lines().map(line).collect()
 }
 
+/// A joint starts operational, and is configured by a boot-up with a reset alone (CiA 302-2, figure 4, letter L).
+#[test]
+fn a_heartbeat_that_a_boot_up_would_leave_is_set_by_one_with_a_reset() {
+    let (mut world, network) = bench(&DRIVES);
+    let (_, rows) = block_on(&mut world, look(&network, &DRIVES)).unwrap();
+    let toml = InitReport::new(rows, None).toml;
+    let of = |name: &str| toml.split("[[drive]]").find(|drive| drive.contains(&format!("\"{name}\""))).unwrap();
+    for (name, _) in DRIVES {
+        let starts_by_itself = model(name).nmt.start_state == canopen::NmtState::Operational;
+        assert_eq!(of(name).contains("`boot --reset` sets"), starts_by_itself, "{}", of(name));
+    }
+    assert!(
+        of("m4230e17b50").contains("`boot --reset` sets it") && of("zlac8030l").contains("`boot` sets one"),
+        "{toml}"
+    );
+}
+
 #[test]
 fn what_cannot_be_known_is_a_guess_with_its_evidence_or_commented_out_with_the_alternatives() {
     let (mut world, network) = bench(&DRIVES);

@@ -170,7 +170,8 @@ fn predicted(intended: &Intended, node: &NodeReport) -> Option<PredictedNode> {
         letter: status.map(ErrorStatus::letter),
         meaning: status.map(ErrorStatus::meaning),
         state: node.state.map(|state| state.to_string()),
-        writes: place.writes.len(),
+        // What is operational is left as it is.
+        writes: if node.status == Some(ErrorStatus::InitiallyOperational) { 0 } else { place.writes.len() },
     })
 }
 

@@ -11,8 +11,8 @@ mod fidelity;
 mod fields;
 mod loops;
 mod motion;
+mod mounted;
 mod placed;
-mod seat;
 mod surroundings;
 mod units;
 
@@ -36,8 +36,25 @@ use words::document::reader::{self, Parameters as Placeholders, Table};
 use words::document::{BadFile, Problem, read_text};
 use words::models::Description;
 
-const EXAMPLE: &str =
-    "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }";
+/// What each table of a file looks like, by the words with which messages name it.
+const EXAMPLES: [(&str, &str); 3] = [
+    (
+        "a group",
+        "[[group]]\n           name = \"arm\"\n           [[group.axis]]\n           node = 1\n           \
+         velocity_deg_s = 90\n           acceleration_deg_s2 = 360\n           jerk_deg_s3 = 3600\n           \
+         following_error_deg = 10",
+    ),
+    (
+        "a base",
+        "[base]\n           wheels = [4, 5]\n           turns = [1, -1]\n           wheel_base_m = 0.4\n           \
+         wheel_radius_m = 0.084\n           linear_m_s = 0.8\n           angular_rad_s = 2.0\n           \
+         wheel_m_s = 0.8\n           wheel_m_s2 = 0.8",
+    ),
+    (
+        "a drive",
+        "[[drive]]\n           model = \"zlac8030l\"\n           node = 4\n           load = { torque_nm = 0.5 }",
+    ),
+];
 
 /// The seed where none is given: runs are repeatable.
 pub const SEED: u64 = 1;
@@ -97,12 +114,15 @@ pub fn read_with_text(path: &Path) -> Result<(Machine, String), String> {
 /// # Errors
 /// What is wrong with the file, and what one looks like.
 pub fn machine(path: &str) -> Result<Machine, String> {
-    read(Path::new(path)).map_err(|reason| format!("cannot use it:\n{reason}\n{}", example()))
+    read(Path::new(path)).map_err(|reason| format!("cannot use it:\n{reason}\n{}", example(&reason)))
 }
 
-/// What a machine file looks like, for messages.
-pub fn example() -> String {
-    format!("a machine file looks like this:\n           {EXAMPLE}")
+/// What a machine file looks like, of the table that is wrong, for messages.
+pub fn example(reason: &str) -> String {
+    let [group, base, drive] = EXAMPLES;
+    let of_it = [group, base].into_iter().find(|(named, _)| reason.contains(&format!("{named} "))).unwrap_or(drive);
+    let what = if of_it == drive { "a machine file" } else { of_it.0 };
+    format!("{what} looks like this:\n           {}", of_it.1)
 }
 
 impl Machine {
@@ -233,8 +253,8 @@ impl Machine {
     /// # Errors
     /// What is in the way, with its place in the file.
     pub fn join(&self, world: &mut World) -> Result<(), BadFile> {
-        let seated = self.drives.iter().filter_map(|placed| Some((placed.spec.node, placed.shaft.as_ref()?)));
-        seated.into_iter().try_for_each(|(node, seat)| seat.take(world, node))?;
+        let mounted = self.drives.iter().filter_map(|placed| Some((placed.spec.node, placed.shaft.as_ref()?)));
+        mounted.into_iter().try_for_each(|(node, on)| on.take(world, node))?;
         self.bodies.iter().try_for_each(|body| body.couple(world))
     }
 
@@ -308,6 +328,22 @@ mod tests {
     }
 
     const DRIVE: &str = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n";
+
+    #[test]
+    fn the_example_of_a_remedy_is_of_the_table_that_is_wrong_and_is_taken() {
+        for (reason, table) in [
+            ("m.toml:4:1: a group has no 'axes'", "[[group]]"),
+            ("an axis of a group needs 'velocity_deg_s'", "[[group.axis]]"),
+            ("a base needs 'wheels'", "[base]"),
+            ("a drive has no 'nodes'", "[[drive]]"),
+        ] {
+            let shown = example(reason);
+            let lines = shown.lines().skip(1).map(str::trim).collect::<Vec<_>>().join("\n");
+            assert!(lines.contains(table), "{reason}: {shown}");
+            let drives = [1, 4, 5].map(|node| format!("[[drive]]\nmodel = 'zlac8030l'\nnode = {node}\n"));
+            parsed(&if table == "[[drive]]" { lines } else { drives.concat() + &lines });
+        }
+    }
 
     #[test]
     fn a_table_becomes_world_commands() {

@@ -139,6 +139,8 @@ fn group(field: &Field<'_>, drives: &[NodeId]) -> Result<GroupPlan, Problem> {
 fn axis(field: &Field<'_>, number: usize, drives: &[NodeId]) -> Result<AxisPlan, Problem> {
     let table = field.table("an axis of a group", AXES)?;
     table.takes_only(AXIS_KEYS)?;
+    let limits = ["velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3", "following_error_deg"];
+    table.need_all(&limits, NUMBER)?;
     let turns = |name| Ok::<_, Problem>(table.need(name, NUMBER)?.number(NUMBER)? / 360.0);
     let limits = AxisLimits {
         range_turns: table.get("range_deg").map(|field| range(&field)).transpose()?,
@@ -154,6 +156,8 @@ fn axis(field: &Field<'_>, number: usize, drives: &[NodeId]) -> Result<AxisPlan,
 fn base(field: &Field<'_>, drives: &[NodeId]) -> Result<BasePlan, Problem> {
     let table = field.table("a base", "a table, begun by [base]")?;
     table.takes_only(BASE_KEYS)?;
+    let lengths = ["wheel_base_m", "wheel_radius_m", "linear_m_s", "angular_rad_s", "wheel_m_s", "wheel_m_s2"];
+    table.need_all(&lengths, NUMBER)?;
     let number = |name| table.need(name, NUMBER)?.number(NUMBER);
     let geometry = Geometry { wheel_base_m: number("wheel_base_m")?, wheel_radius_m: number("wheel_radius_m")? };
     let limits = BaseLimits {
@@ -248,6 +252,9 @@ mod tests {
         let with = |from: &str, to: &str| refusal(&format!("{DRIVES}{GROUP}{}", AXIS.replace(from, to)));
         assert!(with("node = 4", "node = 9").contains("line 11, column 8: the file has no [[drive]] at node 9"));
         assert!(with("velocity_deg_s = 360\n", "").contains("an axis of a group needs 'velocity_deg_s'"));
+        let fewer = AXIS.replace("velocity_deg_s = 360\n", "").replace("jerk_deg_s3 = 3600\n", "");
+        let without = refusal(&format!("{DRIVES}{GROUP}{fewer}"));
+        assert!(without.contains("an axis of a group needs 'velocity_deg_s', 'jerk_deg_s3': "), "{without}");
         let zero = with("jerk_deg_s3 = 3600", "jerk_deg_s3 = 0");
         assert!(zero.contains("the limit of axis 1 for a jerk is 0 deg/s^3"), "{zero}");
         assert!(with("[-90, 180]", "[180, -90]").contains("state the lower one first"));

@@ -14,7 +14,7 @@ use words::models::{Description, resolve_in};
 use words::node::node;
 
 use super::fields::noted;
-use super::seat::Seat;
+use super::mounted::MountedOn;
 use super::{configuration, loops, surroundings, units};
 
 /// What a machine file may say of a drive.
@@ -51,7 +51,7 @@ pub struct Placed {
     /// Where the supply is described.
     pub(super) source_at: Option<Located>,
     /// The shaft of another node that it sits on, with its place in the file.
-    pub(super) shaft: Option<Seat>,
+    pub(super) shaft: Option<MountedOn>,
     /// What is around it, with the places in the file.
     pub(super) around: Vec<(Stimulus, Located)>,
     /// The keys that the file has of it for a simulated machine.
@@ -119,7 +119,7 @@ impl Placed {
         let source_at = ["supply", "supply_v"].into_iter().find_map(|name| table.get(name));
         let source_at = source_at.map(|field| field.problem("").locate(table.text()));
         let around = surroundings::around(table, &mut problems);
-        let shaft = noted(Seat::parse(table), &mut problems);
+        let shaft = noted(MountedOn::parse(table), &mut problems);
         let described = model(table, folder).and_then(|model| loops::named(table, model));
         let (described, id) = match (described, node_id(table)) {
             (Ok(described), Ok(id)) => (described, id),

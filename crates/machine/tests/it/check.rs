@@ -425,6 +425,16 @@ fn a_machine_file_is_predicted_with_its_own_writes() {
     assert!(checked.findings.is_empty(), "{:#?}", checked.findings);
 }
 
+/// CiA 302-2, figure 4, letter L: a node that is operational before is left as it is.
+#[test]
+fn no_write_is_predicted_for_a_node_that_a_boot_up_leaves_as_it_is() {
+    let both = format!("{DRIVE}heartbeat = '200ms'\n[[drive]]\nmodel = '{J}'\nnode = 1\nheartbeat = '200ms'\n");
+    let mut checked = of_machine(&both, &PathBuf::new()).unwrap();
+    let predicted = checked.predict().unwrap();
+    let of = |node: u8| predicted.nodes.iter().find(|row| row.node == node).map(|row| (row.letter, row.writes));
+    assert_eq!((of(1), of(4)), (Some((Some('L'), 0)), Some((None, 1))));
+}
+
 #[test]
 fn each_trap_of_a_machine_file_is_at_its_line() {
     for (line, rule, severity, at) in [

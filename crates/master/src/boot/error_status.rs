@@ -99,12 +99,7 @@ const TABLE: [StatusRow; 15] = [
         "its heartbeat did not come when its watch began",
         "make the consumer time longer than the time in its 1017h",
     ),
-    (
-        InitiallyOperational,
-        'L',
-        "it was operational before, and was left as it is",
-        "to configure it, stop it and reset it",
-    ),
+    (InitiallyOperational, 'L', "already operational, left unchanged", "to configure it, stop it and reset it"),
     (OtherProduct, 'M', "its product code (1018h:02) is not the expected one (1F86h)", WRONG_DEVICE),
     (
         OtherRevision,

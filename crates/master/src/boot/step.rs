@@ -218,7 +218,7 @@ impl fmt::Display for Found {
             Self::Value(value) => write!(f, "{value:X}h"),
             Self::Done => f.write_str("that"),
             Self::AsItWas => f.write_str("that already"),
-            Self::Came => f.write_str("one"),
+            Self::Came => f.write_str("received"),
             Self::State(state) => write!(f, "{state}"),
             Self::Refused(code) => write!(f, "refused: {code}"),
             Self::Silent { waited, tries, last, .. } => {

@@ -122,7 +122,9 @@ impl fmt::Display for Refusal {
             Self::LostOperation(None) => {
                 f.write_str("its statusword shows no state any more. Switch it off to start again")
             }
-            Self::WrongKind => f.write_str("its mode takes set-points of another kind. The drive is held instead"),
+            Self::WrongKind => {
+                f.write_str("its mode takes set-points of another kind; the drive holds its position instead")
+            }
             Self::NoNumber => {
                 f.write_str("the set-point is not a number that its object can hold. The drive is held instead")
             }

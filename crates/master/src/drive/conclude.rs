@@ -23,7 +23,7 @@ pub(crate) enum Trigger {
     Mode(ModeOfOperation),
     /// The shaft does not come to rest; speed in r/min.
     StillTurning(f64),
-    /// The sensor of its shaft is at fault, with this name, so that the speed it shows is none; and what to do about that.
+    /// The sensor of its shaft is at fault, with this name, so that its speed reading is invalid; and what to do about that.
     Unseen { sensor: &'static str, remedy: &'static str },
     /// Operation ended in the middle of a motion.
     LostOperation,

@@ -74,7 +74,7 @@ impl Network {
         self.quick_stop_everything(models).await
     }
 
-    /// The same, and the NMT state of each node stays as it is: for who may stop drives and may not do more to the bus. A drive that
+    /// The same, and the NMT state of each node stays as it is: for callers that may only stop drives. A drive that
     /// another master keeps going by PDO is among the results as one that was not seen to stand, and a node in NMT state
     /// stopped as one that does not answer.
     ///

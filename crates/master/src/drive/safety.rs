@@ -296,7 +296,7 @@ impl Drive {
         Ok(rest.looks >= STANDSTILL_LOOKS)
     }
 
-    /// Fails where a fault keeps the drive from seeing its shaft: the speed that it shows is none.
+    /// Fails where a fault keeps the drive from seeing its shaft: its speed reading is invalid.
     async fn check_sight(&self, intent: &'static str) -> Result<(), Error> {
         let code = match self.node.upload(self.fault_code()).await {
             Ok(payload) => payload.raw() as u16,

@@ -128,7 +128,7 @@ pub enum GroupError {
     },
     /// A shaft is not where its path has ended.
     #[error(
-        "axis {axis}, node {node}, is {} deg from where it was led, {} s after its last set-point: it is held back, or its drive lost \
+        "axis {axis}, node {node}, is {} deg from its set-point, {} s after its last set-point: it is held back, or its drive lost \
          set-points", Shown(*error_turns * 360.0), waited.as_secs_f64()
     )]
     NotReached {

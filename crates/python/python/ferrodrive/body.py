@@ -39,7 +39,7 @@ class Body:
         self._world.stimulate_body(self._name, name, *values)
 
     def state(self) -> dict[str, Any]:
-        """Where it truly is (``body base get``): of a base ``x_m``, ``y_m``, ``heading_deg``, ``speed_m_s`` and the slip of its
+        """True pose (``body base get``): of a base ``x_m``, ``y_m``, ``heading_deg``, ``speed_m_s`` and the slip of its
         wheels; of an arm ``joints_deg`` and ``tool_m``.
 
         >>> sorted(body.state())[0]

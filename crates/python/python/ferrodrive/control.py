@@ -68,7 +68,10 @@ class Control:
         self._socket.close()
 
     def request(self, request: str, **fields: Any) -> dict[str, Any]:
-        """Sends a request and returns its answer; one that is refused raises :class:`~ferrodrive.Refused`.
+        """Sends a request and returns its answer.
+
+        :raises Refused: it was refused
+        :raises SimulatorError: no answer came in time, or the connection was lost
 
         >>> control.request("world", line="now")["ok"]
         True
@@ -128,8 +131,10 @@ class Control:
         return self._news.popleft()
 
     def wait_for(self, kind: str, node: Optional[int] = None, within: float = ANSWER_TIMEOUT_S) -> dict[str, Any]:
-        """The next event of a kind that was subscribed to; events before it are passed over. None in time raises
-        :class:`TimeoutError`.
+        """The next event of a kind that was subscribed to; events before it are passed over.
+
+        :param within: longest wait in s
+        :raises TimeoutError: none came in time
 
         >>> number = control.subscribe_events()
         >>> control.world("4 power cut")["ok"]

@@ -376,7 +376,7 @@ class Drive(_Orders):
         :param by: distance or amplitude in degrees
         :param speed_rpm: of steps, ramp and prbs
         :param frequency: of sine, the first one of chirp, in Hz
-        :param to_frequency: the last one of chirp
+        :param to_frequency: the last one of chirp, in Hz
         :param periods: of sine
         :param time: that steps and ramp keep their speed, of a bit of prbs, of all of chirp, in s
         :param path: times in s and degrees
@@ -422,7 +422,7 @@ class Drive(_Orders):
         shaft turns to and fro. What ``ferrodrive tune`` does; of a stepper: :meth:`tune_ramps`.
 
         :param bandwidth: where the gain of the speed loop is to fall to one, in Hz; instead of a phase margin
-        :param phase_margin: degrees that are to be left there; as stiff as that allows
+        :param phase_margin: phase margin to keep, in degrees; as stiff as that allows
         :param position: the loop of position too
         :param speed_rpm: highest speed of the measurement, of the motor's shaft: 120 without it, of a joint 600, of a servo what ``loops`` of its machine file says
         :param current_a: the most that the speed loop may ask for: 15 without it, of a servo what ``loops`` says

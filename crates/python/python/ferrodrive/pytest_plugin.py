@@ -119,7 +119,7 @@ def machine_file(request: pytest.FixtureRequest, wanted: dict[str, Any]) -> path
     if "drives" in wanted:
         raise ValueError("the drives are in the machine file: omit drives, or add them there")
     folders = (request.path.parent, request.config.rootpath)
-    places = [folder / wanted["machine"] for folder in folders]
+    places: list[pathlib.Path] = [folder / wanted["machine"] for folder in folders]
     for place in places:
         if place.exists():
             return place

@@ -413,7 +413,7 @@ class BackupReport(TypedDict, total=False):
 
 
 class Difference(TypedDict):
-    """An object that differs; None where there is not a value."""
+    """An object that differs; None where a value is absent."""
 
     object: str
     name: Optional[str]

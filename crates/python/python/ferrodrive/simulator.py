@@ -133,6 +133,8 @@ class Simulator:
     def port(self, protocol: str = "socketcand") -> int:
         """The port of a listener, as the ``ready`` line names it.
 
+        :raises SimulatorError: it has no listener of this protocol
+
         >>> sim.port() > 1023
         True
         """
@@ -174,6 +176,8 @@ class Simulator:
 
     def tell(self, line: str) -> dict[str, Any]:
         """Sends a line and returns its answer, whatever it is.
+
+        :raises SimulatorError: it has ended, or does not answer in time
 
         >>> sim.tell("fly")["ok"]
         False

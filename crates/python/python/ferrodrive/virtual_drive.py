@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, TypedDict, Union, cast
 
 from .words import Number, number, word
 
 if TYPE_CHECKING:
     from .world import World
+
+
+class _Measured(TypedDict):
+    """What a drive reports, as far as it has a property."""
+
+    node_id: int
+    powered: bool
+    statusword: Optional[int]
+    error_code: int
+    position: int
+    rotor_position: Optional[int]
+    position_demand: Optional[int]
+    velocity_rpm: float
+    velocity_demand_rpm: Optional[float]
+    current_a: float
+    current_demand_a: Optional[float]
+    supply_v: float
+    motor_c: Optional[float]
+    driver_c: Optional[float]
+    outputs: dict[str, bool]
+    analogue: dict[str, int]
+    brake: Optional[str]
+    output_shaft: Optional[dict[str, float]]
+    damage: Optional[str]
+    shaft_angle_rad: float
+    bus: str
 
 
 class VirtualDrive:
@@ -79,111 +105,114 @@ class VirtualDrive:
         """
         return self._world.report(self._place)
 
+    def _measured(self) -> _Measured:
+        return cast(_Measured, self.report())
+
     @property
     def node_id(self) -> int:
         """The node-ID that it uses at present."""
-        return self.report()["node_id"]
+        return self._measured()["node_id"]
 
     @property
     def powered(self) -> bool:
         """True while its supply is switched on."""
-        return self.report()["powered"]
+        return self._measured()["powered"]
 
     @property
     def statusword(self) -> Optional[int]:
         """Statusword (6041h); None without power."""
-        return self.report()["statusword"]
+        return self._measured()["statusword"]
 
     @property
     def error_code(self) -> int:
         """Code of the present fault in the drive's own numbering; 0 for none."""
-        return self.report()["error_code"]
+        return self._measured()["error_code"]
 
     @property
     def position(self) -> int:
         """Actual position in the drive's own counts."""
-        return self.report()["position"]
+        return self._measured()["position"]
 
     @property
     def rotor_position(self) -> Optional[int]:
         """Where the rotor truly is in the drive's counts, of a drive that does not measure it."""
-        return self.report()["rotor_position"]
+        return self._measured()["rotor_position"]
 
     @property
     def position_demand(self) -> Optional[int]:
         """Position demand in the drive's counts, where a mode has one."""
-        return self.report()["position_demand"]
+        return self._measured()["position_demand"]
 
     @property
     def velocity_rpm(self) -> float:
         """True speed of the motor shaft in r/min."""
-        return self.report()["velocity_rpm"]
+        return self._measured()["velocity_rpm"]
 
     @property
     def velocity_demand_rpm(self) -> Optional[float]:
         """Velocity demand at the motor shaft in r/min, where a mode has one."""
-        return self.report()["velocity_demand_rpm"]
+        return self._measured()["velocity_demand_rpm"]
 
     @property
     def current_a(self) -> float:
         """Signed motor current in A."""
-        return self.report()["current_a"]
+        return self._measured()["current_a"]
 
     @property
     def current_demand_a(self) -> Optional[float]:
         """Current demand in A, where a mode has one."""
-        return self.report()["current_demand_a"]
+        return self._measured()["current_demand_a"]
 
     @property
     def supply_v(self) -> float:
         """Voltage at the supply terminals in V."""
-        return self.report()["supply_v"]
+        return self._measured()["supply_v"]
 
     @property
     def motor_c(self) -> Optional[float]:
         """Temperature of the motor in °C, where it has a sensor."""
-        return self.report()["motor_c"]
+        return self._measured()["motor_c"]
 
     @property
     def driver_c(self) -> Optional[float]:
         """Temperature of the power stage in °C, where it has a sensor."""
-        return self.report()["driver_c"]
+        return self._measured()["driver_c"]
 
     @property
     def outputs(self) -> dict[str, bool]:
         """Levels of the digital outputs by name."""
-        return self.report()["outputs"]
+        return self._measured()["outputs"]
 
     @property
     def analogue(self) -> dict[str, int]:
         """Values of the analogue channels of a device by CiA 401, by their objects: ``{"6401:01": 12000, "6411:01": 0}``."""
-        return self.report()["analogue"]
+        return self._measured()["analogue"]
 
     @property
     def brake(self) -> Optional[str]:
         """``released`` or ``engaged``; None where there is no holding brake."""
-        return self.report()["brake"]
+        return self._measured()["brake"]
 
     @property
     def output_shaft(self) -> Optional[dict[str, float]]:
         """The shaft behind a reducer, where there is one: ``angle_rad``, ``torque_nm``, ``most_nm`` (the most there has been),
         ``overloads`` and ``jumps`` (how often), ``slip_rad``."""
-        return self.report()["output_shaft"]
+        return self._measured()["output_shaft"]
 
     @property
     def damage(self) -> Optional[str]:
         """What has been destroyed and what to do about it; None if nothing."""
-        return self.report()["damage"]
+        return self._measured()["damage"]
 
     @property
     def shaft_angle_rad(self) -> float:
         """True angle of the motor shaft in rad, many turns. Where it begins is the machine's own: compare with an earlier one."""
-        return self.report()["shaft_angle_rad"]
+        return self._measured()["shaft_angle_rad"]
 
     @property
     def bus(self) -> str:
         """``error-active``, ``error-passive``, ``bus-off``, ``cut`` or ``off`` (no power)."""
-        return self.report()["bus"]
+        return self._measured()["bus"]
 
     # What the outer world can do.
 
@@ -233,7 +262,7 @@ class VirtualDrive:
         self._do("power", "cut")
 
     def set_input(self, name: str, level: bool) -> None:
-        """Level of a digital input (``input X0 1``). Takes a switch away that is tied to it.
+        """Level of a digital input (``input X0 1``). Removes a switch that is bound to it.
 
         >>> wheel.set_input(wheel.inputs[0], True)
         """

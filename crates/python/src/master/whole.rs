@@ -57,7 +57,7 @@ impl Network {
         matches!(&*self.runner, Runner::World(_))
     }
 
-    /// What is true of virtual drives; `None` on a real bus.
+    /// True values from the simulation of virtual drives; `None` on a real bus.
     pub(super) fn true_values(&self, py: Python<'_>) -> PyResult<Option<LiveValues>> {
         match &*self.runner {
             Runner::World(shared) => Ok(Some(shared.lock(py)?.world.live_values())),

@@ -13,7 +13,7 @@ use super::range::SwitchRange;
 pub enum Stimulus {
     /// `power on`, `power off`, `power cycle`, `power cut`.
     Power(Power),
-    /// `input X0 1`: a digital input's level. Takes a switch away that is tied to it.
+    /// `input X0 1`: a digital input's level. Removes a switch that is bound to it.
     Input {
         /// The input's name, in any case of letters.
         name: String,

@@ -1,4 +1,4 @@
-//! The wire and everybody's controller on it: how time passes there, and how frames end.
+//! The wire and the controllers on it: how time passes there, and how frames end.
 //!
 //! How a frame starts and what will become of it is in `delivery`, nodes with a cut cable are in `alone`.
 

@@ -1,6 +1,6 @@
 //! Fault confinement (ISO 11898-1, clause 12): error counters and what follows from them.
 //!
-//! The rules are numbered as in the Bosch CAN Specification 2.0, part A, chapter 7, which anybody can read; the
+//! The rules are numbered as in the Bosch CAN Specification 2.0, part A, chapter 7, which is free to read; the
 //! standard has the same. Counted at the grain of a frame: rules 4 to 6 (dominant bits
 //! during or long after an error flag) need a wire that is stuck, which is not modelled.
 

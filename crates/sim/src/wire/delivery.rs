@@ -1,4 +1,4 @@
-//! What becomes of a frame, decided when it starts: everybody who has a part in it is known by then.
+//! What becomes of a frame, decided when it starts: every node that has a part in it is known by then.
 
 use can::{Frame, Instant, frame_bits};
 

@@ -9,7 +9,7 @@ use super::World;
 use super::crew::{Errand, Found, Job, OnBus};
 use super::member::{Member, Vacant};
 
-/// Fewer drives than that are no work for several threads: with ten control periods each it is some 12 us, and a hand-over takes 3.
+/// Fewer drives than that are not worth several threads: with ten control periods each it is some 12 us, and a hand-over takes 3.
 const WORTH_IT: usize = 16;
 
 impl World {

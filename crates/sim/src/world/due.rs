@@ -1,4 +1,4 @@
-//! Who is due next, without asking everybody.
+//! Who is due next, without asking every node.
 
 use can::Instant;
 

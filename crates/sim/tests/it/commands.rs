@@ -129,7 +129,7 @@ fn a_line_too_long_and_one_with_escapes_are_refused_without_an_echo_of_either() 
 #[test]
 fn errors_say_what_is_there_and_change_nothing() {
     let (mut world, _) = world();
-    assert_eq!(refusal(&mut world, "7 get"), "no drive was started as node 7; there is 4, 2");
+    assert_eq!(refusal(&mut world, "7 get"), "no drive at node 7; running: 4, 2");
     assert_eq!(refusal(&mut world, "4 input X9 1"), "a testdrive has no input \"X9\"; it has X0, X1");
     assert_eq!(refusal(&mut world, "4 battery off"), "a testdrive has no battery");
     assert_eq!(refusal(&mut world, "4 fault hall on"), "a testdrive has no Hall sensor");
@@ -137,7 +137,7 @@ fn errors_say_what_is_there_and_change_nothing() {
     assert_eq!(refusal(&mut world, "4 supply 1000"), "supply voltage must be 0 to 100 V, not 1000");
     assert_eq!(refusal(&mut world, "4 supply"), "expected: NODE supply VOLTS [limit AMPERES] [resistance OHMS]");
     assert!(refusal(&mut world, "\u{7}\"quoted\\").starts_with("unknown command"));
-    assert_eq!(refusal(&mut World::new(Bitrate::M1, 1), "4 get"), "no drive was started as node 4; there is none");
+    assert_eq!(refusal(&mut World::new(Bitrate::M1, 1), "4 get"), "no drive at node 4; running: none");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::pdu::MAX_LENGTH;
 /// Transaction, protocol and length.
 const HEAD: usize = 6;
 
-/// Bytes that are no Modbus: there is no telling where the next request would begin.
+/// Bytes that are not Modbus: there is no telling where the next request would begin.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct NoModbus;
 

@@ -25,7 +25,7 @@ pub enum RegisterAccess {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ModbusException {
-    /// The function is none of those that are served.
+    /// The function is not among those that are served.
     IllegalFunction = 0x01,
     /// There is no such register, or it cannot be written.
     IllegalDataAddress = 0x02,

@@ -1,7 +1,7 @@
 //! python-can's `udp_multicast`: a bus of all programs of a network that joined the same multicast group.
 //!
-//! Source: `can/interfaces/udp_multicast` of python-can 4.6. There is neither arbitration nor acknowledgement: a frame is heard by who
-//! is there.
+//! Source: `can/interfaces/udp_multicast` of python-can 4.6. There is neither arbitration nor acknowledgement: a frame is heard by the programs
+//! that are there.
 
 mod bus;
 mod codec;

@@ -141,11 +141,13 @@ impl Located {
         if shown.trim().is_empty() {
             return Ok(());
         }
-        let before = self.column - 1 - skipped;
-        let marks = self.width.min(WIDEST.saturating_sub(before)).max(1);
+        let (cut, rest) = (if skipped > 0 { ".. " } else { "" }, self.shown.chars().count() > skipped + WIDEST);
+        let end = if rest { " .." } else { "" };
+        let before = self.column - 1 - skipped + cut.len();
+        let marks = self.width.min((WIDEST + cut.len()).saturating_sub(before)).max(1);
         let line = self.line;
         let gutter = line.to_string().len();
-        write!(f, "\n  {line} | {shown}\n  {:gutter$} | {:before$}{}", "", "", "^".repeat(marks))
+        write!(f, "\n  {line} | {cut}{shown}{end}\n  {:gutter$} | {:before$}{}", "", "", "^".repeat(marks))
     }
 }
 
@@ -175,5 +177,11 @@ mod tests {
         let many = (0..1000).map(|at| Problem::new(at * 100..at * 100 + 50_000, "no")).collect();
         let shown = BadFile::new(&text, many).to_string();
         assert!(shown.len() < 8_000 && shown.contains("and 980 more"), "{}", shown.len());
+        let line = format!("{}= 'slip'{}", " ".repeat(200), "y".repeat(200));
+        let shown = BadFile::new(&line, vec![Problem::new(202..208, "x")]).to_string();
+        let [_, excerpt, mark] = shown.lines().collect::<Vec<_>>()[..] else { panic!("{shown}") };
+        assert!(excerpt.starts_with("  1 | .. ") && excerpt.ends_with("y .."), "{shown}");
+        assert_eq!(excerpt.find("'slip'"), mark.find('^'), "{shown}");
+        assert!(mark.ends_with(" ^^^^^^"), "{shown}");
     }
 }

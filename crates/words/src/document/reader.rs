@@ -70,7 +70,8 @@ impl<'a> Table<'a> {
         let problems = strange.map(|key| {
             let name = key.get_ref();
             let near = did_you_mean(&near(name, known.iter().copied()));
-            let what = format!("{} has no '{name}'{near}; it has: {}", self.what, known.join(", "));
+            let its = if near.is_empty() { "; it has" } else { " It has" };
+            let what = format!("{} has no '{name}'{near}{its}: {}", self.what, known.join(", "));
             Problem::new(key.span(), what)
         });
         problems.collect()
@@ -95,6 +96,19 @@ impl<'a> Table<'a> {
     /// That it is not.
     pub fn need(&self, name: &str, expected: &str) -> Result<Field<'a>, Problem> {
         self.get(name).ok_or_else(|| Problem::new(self.at.clone(), format!("{} needs '{name}': {expected}", self.what)))
+    }
+
+    /// That all of several names are there.
+    ///
+    /// # Errors
+    /// Those that are not, at once.
+    pub fn need_all(&self, names: &[&str], expected: &str) -> Result<(), Problem> {
+        let missing: Vec<_> = names.iter().filter(|name| self.get(name).is_none()).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let names = missing.iter().map(|name| format!("'{name}'")).collect::<Vec<_>>().join(", ");
+        Err(Problem::new(self.at.clone(), format!("{} needs {names}: {expected}", self.what)))
     }
 
     /// All names with their values, in the order of the alphabet.

@@ -141,7 +141,7 @@ fn a_stop_gets_in_however_many_connections_are_idle() {
     let mut stopper = gateway.client();
     assert_eq!(stopper.ask("[1] 4 w 0x6040 0 u16 2"), "[1] OK");
     wait_until("the drive stands", || speed_of(&simulator).abs() < 1.0);
-    // Who has moved a drive does not make room for who has not.
+    // A client that has moved a drive does not make room for one that has not.
     assert!(mover.ask("[50] 4 r 0x606C 0 i32").starts_with("[50] "));
     gateway.reported("has made room");
     drop(idle);

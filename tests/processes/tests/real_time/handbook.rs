@@ -1,5 +1,5 @@
-//! The commands of `docs/handbook`, as a reader would type them: each ends well, and each line for a simulator's terminal
-//! is answered. They are in the project's folder, not in the package.
+//! The commands of `docs/handbook`, and of the pages beside it, as a reader would type them: each ends well, and each line for a
+//! simulator's terminal is answered. They are in the project's folder, not in the package.
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,9 @@ const PRINTED_PORT: &str = "29536";
 
 /// Lines that are not our commands: checked elsewhere, or of another program.
 const OTHERS: &[&str] = &["cargo ", "git ", "pip ", "#"];
+
+/// A bus that is not there: what is typed on it is parsed by `crates/cli/src/tests/pages.rs`.
+const REAL_BUS: &str = "--bus can0";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -46,12 +49,12 @@ fn follow_in(name: &str, folder: &Path) -> usize {
     for (language, lines) in blocks(&text) {
         for line in lines.into_iter().filter(|line| !line.trim().is_empty()) {
             match (language, &mut simulator) {
-                ("sh", _) if OTHERS.iter().any(|other| line.starts_with(other)) => {}
+                ("sh", _) if OTHERS.iter().any(|other| line.starts_with(other)) || line.contains(REAL_BUS) => {}
                 ("sh", running) => {
                     let line = line.split(" #").next().unwrap_or_default();
                     let port = running.as_ref().map_or("0", |(_, port)| port);
                     let line = line.replace(PRINTED_PORT, port);
-                    let words: Vec<&str> = line.split_whitespace().collect();
+                    let words = words(&line);
                     let arguments = words.strip_prefix(&["ferrodrive"]).unwrap_or_else(|| panic!("{name}: {line}"));
                     if arguments[0] == "sim" {
                         let started = Simulator::start(&arguments[1..]);
@@ -76,6 +79,29 @@ fn follow_in(name: &str, folder: &Path) -> usize {
     }
     commands
 }
+
+/// The words of a line, of which one may stand in quotation marks.
+fn words(line: &str) -> Vec<&str> {
+    let parts = line.split('\'').enumerate();
+    parts.flat_map(|(n, part)| if n % 2 == 1 { vec![part] } else { part.split_whitespace().collect() }).collect()
+}
+
+/// The pages beside the handbook whose commands are run here, and how many they are.
+const DOCS_FOLLOWED: [(&str, usize); 3] = [("../eds.md", 6), ("../machine-file.md", 2), ("../conformance.md", 3)];
+
+/// Those whose commands are not run here, and why.
+const DOCS_NOT_FOLLOWED: [(&str, &str); 4] = [
+    (
+        "../control.md",
+        "its servers end with a signal, and clients speak to them: crates/cli/tests/command_line, simulator.rs",
+    ),
+    ("../performance.md", "its commands measure this machine"),
+    ("../recording.md", "its record ends with a simulator: recording.rs, crates/cli/tests/command_line/recording.rs"),
+    (
+        "../scenarios.md",
+        "a thousand runs, and a host outside: crates/cli/tests/command_line/{run,sweep}.rs, run_served.rs",
+    ),
+];
 
 /// The pages whose commands are run here, and how many they are.
 const FOLLOWED: [(&str, usize); 17] = [
@@ -118,7 +144,7 @@ const NOT_FOLLOWED: [(&str, &str); 15] = [
 ];
 
 fn follows(name: &str, followed: usize) {
-    let expected = FOLLOWED.iter().find(|(page, _)| *page == name).map(|(_, count)| *count);
+    let expected = FOLLOWED.iter().chain(&DOCS_FOLLOWED).find(|(page, _)| *page == name).map(|(_, count)| *count);
     assert_eq!(Some(followed), expected, "{name}");
 }
 
@@ -130,6 +156,34 @@ fn every_page_of_the_handbook_is_followed_or_it_is_said_why_not() {
     let known = FOLLOWED.iter().map(|(page, _)| *page).chain(NOT_FOLLOWED.iter().map(|(page, _)| *page));
     let known: std::collections::BTreeSet<_> = known.map(str::to_owned).collect();
     assert_eq!(pages.collect::<std::collections::BTreeSet<_>>(), known);
+}
+
+#[test]
+fn every_page_beside_the_handbook_that_has_commands_is_followed_or_it_is_said_why_not() {
+    let folder = std::fs::read_dir(root().join("docs")).expect("the pages are there");
+    let files = folder.map(|entry| entry.expect("a readable folder").file_name().into_string().expect("a name"));
+    let pages = files.filter(|name| name.ends_with(".md")).map(|name| format!("../{name}"));
+    let has_commands = |name: &String| {
+        blocks(&page(name)).iter().any(|(_, lines)| lines.iter().any(|line| line.starts_with("ferrodrive ")))
+    };
+    let known = DOCS_FOLLOWED.iter().map(|(page, _)| *page).chain(DOCS_NOT_FOLLOWED.iter().map(|(page, _)| *page));
+    let known: std::collections::BTreeSet<_> = known.map(str::to_owned).collect();
+    assert_eq!(pages.filter(has_commands).collect::<std::collections::BTreeSet<_>>(), known);
+}
+
+#[test]
+fn every_command_of_the_pages_beside_the_handbook_ends_well() {
+    let folder = scratch("docs_pages");
+    let made = command(&["eds", "zlac8030l", "-o", &folder.path("vendor.eds")]).output().expect("the binary runs");
+    assert!(made.status.success());
+    follows("../eds.md", follow_in("../eds.md", &folder));
+    follows("../conformance.md", follow_in("../conformance.md", &folder));
+    // The machine of the section with these commands.
+    let text = page("../machine-file.md");
+    let units = text.split_once("## Units").expect("a section on units").1;
+    let (_, lines) = &blocks(units)[0];
+    std::fs::write(folder.join("FILE.toml"), lines.join("\n")).unwrap();
+    follows("../machine-file.md", follow_in("../machine-file.md", &folder));
 }
 
 #[test]

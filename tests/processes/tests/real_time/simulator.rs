@@ -45,6 +45,18 @@ fn commands_reach_it_over_socketcand_and_slcan() {
     }
 }
 
+/// Lines of JSON and nothing else, from the first on.
+#[test]
+fn with_json_the_line_that_it_is_ready_is_json_too() {
+    let mut simulator = Simulator::start(&["--json", "--drive", "zlac8030l@4", "--serve", "socketcand://127.0.0.1:0"]);
+    let ready: serde_json::Value = serde_json::from_str(&simulator.ready).unwrap();
+    let places = ready["ready"].as_array().unwrap();
+    assert!(ready["ok"] == true && places.len() == 1, "{ready}");
+    let bus = format!("{}/can0", places[0].as_str().unwrap());
+    assert_eq!(done(&["--bus", &bus, "--json", "read", "4", "200B"]).json()["value"], 1024);
+    assert_eq!(simulator.ask("now")["ok"], true);
+}
+
 #[test]
 fn two_simulators_joined_by_a_bus_hear_each_other() {
     let first = simulator(&[]);

@@ -102,7 +102,7 @@ fn with_a_commutation_angle_the_rotor_follows_it() {
     let pole_pairs = i64::from(bench.machine.assembly().motor(0).unwrap().model.pmsm.pole_pairs);
     bench.set(&[(0x60EA, 0, 0), (0x6071, 0, 500)]);
     bench.run_ms(1000);
-    // It comes to rest where its torque is none, however much it is asked for.
+    // It comes to rest where its torque is zero, however much it is asked for.
     assert!(bench.rpm().abs() < 3.0, "{}", bench.rpm());
     let start = bench.read(0x6063, 0);
     // Two electrical turns, in steps of a hundredth.

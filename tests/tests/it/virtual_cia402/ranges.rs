@@ -2,7 +2,7 @@
 
 use crate::virtual_cia402::bench::{Bench, TURN, changed};
 
-/// A turntable of 3600 units a turn, which 131072 increments are no whole multiple of, that shows 0 to 3599.
+/// A turntable of 3600 units a turn, of which 131072 increments are not a whole multiple, that shows 0 to 3599.
 fn turntable() -> Bench {
     let mut bench = Bench::new();
     bench.set(&[(0x6092, 1, 3600), (0x607B, 1, 0), (0x607B, 2, 3599), (0x6067, 0, 1), (0x6065, 0, 0xFFFF_FFFF)]);

@@ -99,7 +99,7 @@ fn every_code_stops_along_its_ramp_and_ends_in_its_state() {
 }
 
 /// A flywheel at full speed, and nothing that takes what it feeds back: a stop on the current limit is an over-voltage, one on the
-/// voltage limit is slower and is none.
+/// voltage limit is slower and is not.
 #[test]
 fn a_stop_on_the_voltage_limit_keeps_the_bus_below_its_over_voltage() {
     let stopped = |object: u16, code: i64| {

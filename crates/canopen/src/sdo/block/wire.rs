@@ -28,7 +28,7 @@ const LAST: u8 = 0x80;
 /// The first byte of an abort, which may come at any time: no segment has the number 0.
 pub const ABORT: u8 = 4 << 5;
 
-/// Up to seven bytes of a block. How many of the last one are none, the end of the transfer says.
+/// Up to seven bytes of a block. How many of the last one are unused, the end of the transfer says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// It is the last one of all.
@@ -98,7 +98,7 @@ pub struct Acknowledgement {
 /// The end of the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct End {
-    /// How many bytes of the last segment are none, 0 to 7.
+    /// How many bytes of the last segment carry no data, 0 to 7.
     pub unused: u8,
     /// Over all bytes; 0 where one of the two cannot form it.
     pub checksum: u16,

@@ -177,7 +177,7 @@ fn what_is_wrong_is_answered_with_the_code_that_the_standard_has_for_it_and_noth
     talk(&mut node, &[("604#0061626364656667", &refused("03000405"))]);
     complete(&mut node);
     talk(&mut node, &[(&end(0, b"fourteen bytez"), &refused("04000405"))]);
-    // Fewer bytes than declared, by the number of those that are none in the last segment; more.
+    // Fewer bytes than declared, by the number of those that are unused in the last segment; more.
     complete(&mut node);
     talk(&mut node, &[(&end(1, &data[..13]), &refused("10000706"))]);
     talk(&mut node, &HALF);

@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::command::tools::eds::source;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
+use crate::output::{Report, is_stdout};
 use crate::plain::plain;
 use plot::Paint;
 use plot::Table;
@@ -274,11 +274,6 @@ pub(in crate::command) fn new_file(output: Option<&Path>, force: bool) -> Result
         Some(path) => Err(exists(path)),
         None => Ok(path),
     }
-}
-
-/// True for the `-` that means standard output.
-pub(in crate::command) fn is_stdout(path: &Path) -> bool {
-    path == Path::new("-")
 }
 
 fn exists(path: &Path) -> Failure {

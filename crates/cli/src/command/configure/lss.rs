@@ -495,7 +495,7 @@ fn no_answer(who: &str) -> Failure {
 /// The models that have no LSS, in words.
 fn without_lss() -> String {
     let without: Vec<_> = devices::all().iter().filter(|model| !model.lss).map(|model| model.name).collect();
-    format!("by their manuals {} have none", without.join(", "))
+    format!("according to their manuals, {} do not support it", without.join(", "))
 }
 
 const LSS_REFUSED: &str = "choose what its manual lists for LSS (CiA 305), or set it by its own objects";

@@ -14,10 +14,10 @@ use words::node::node;
 
 use super::params::journal::note_kept;
 use crate::command::cycles::CycleArgs;
-use crate::command::record_and_replay::plot::read_record;
+use crate::command::record_and_replay::plot::{read_record, svg_path, write_svg};
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
-use crate::failure::Failure;
+use crate::failure::{Failure, refuse_missing_folder};
 use crate::output::Report;
 use console::guard::{Guard, GuardArgs};
 use plot::{Paint, Table};
@@ -35,7 +35,7 @@ enum WhichLoop {
     Position,
 }
 
-/// Find gains for the loops of a drive, or ramps and currents of a stepper that lose no step
+/// Find gains for a drive's loops, or ramps for a stepper
 ///
 /// Of a servo by CiA 402 `loops` of its machine file say which objects its maker has for them.
 /// A stepper without an encoder has no loops, and shows no lost step: what it needs is computed from the load that --load-inertia,
@@ -47,7 +47,7 @@ enum WhichLoop {
 /// reaches --current or --travel. Afterwards the drive has the parameters that it had, unless --apply is given. Keep an emergency stop within reach, and the load free to turn.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive tune 4\n  \
-    ferrodrive tune 4 --bandwidth 20 --loop position --picture tune.svg\n  \
+    ferrodrive tune 4 --bandwidth 20 --loop position -o tune.svg\n  \
     ferrodrive --bus can0 tune 4 --speed 60rpm --current 8A --apply\n  \
     ferrodrive tune 4 --capture run.mcap --torque-constant 0.9\n  \
     ferrodrive tune 2 --speed 600rpm --load-inertia 3e-5 --load-friction 0.05")]
@@ -61,7 +61,7 @@ pub(crate) struct Tune {
     /// Objective: where the gain of the speed loop falls to one, in Hz
     #[arg(long, value_name = "HZ", conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
-    /// Objective: degrees that are to be left there
+    /// Objective: phase margin to keep, in degrees
     #[arg(long, value_name = "DEGREES", default_value = "40")]
     phase_margin: f64,
     /// Highest speed of the motor's shaft (default: what is usual)
@@ -85,7 +85,7 @@ pub(crate) struct Tune {
     /// Torque per ampere of another motor than the model's own, in N·m/A
     #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
-    /// Say what this record of the drive shows; nothing moves
+    /// Identify the drive from a recorded run; nothing moves
     ///
     /// Of `capture`, `test-motion` or another instrument, NAME.mcap or NAME.csv: frequency response with coherence, masses and speed
     /// loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or velocity_rpm. No gains are proposed.
@@ -109,9 +109,9 @@ pub(crate) struct Tune {
     /// Write the proposed values to the drive, and measure once more
     #[arg(long)]
     apply: bool,
-    /// Draw frequency response and trials into this SVG file
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
+    /// Draw frequency response and trials to this file (-: standard output)
+    #[arg(long, short, alias = "picture", value_name = "FILE.svg", value_parser = svg_path)]
+    output: Option<PathBuf>,
     /// Longest time for the transaction
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_duration, hide = true)]
     within: Duration,
@@ -180,14 +180,23 @@ impl Tune {
 
     /// Measures or computes, and proposes; and writes, if that was asked for.
     pub(crate) async fn run(&self, context: &Context) -> Result<Tuned, Failure> {
+        if let Some(path) = &self.output {
+            refuse_missing_folder("the picture", path)?;
+        }
         if let Some(path) = &self.capture {
-            return self.of_capture(path, context).map(|report| Tuned::Captured(Box::new(report)));
+            return self.of_capture(path, context);
         }
         let drive = context.known_drive(self.node).await?;
         let journal = (!context.is_embedded()).then(|| default_path(self.node));
         if host::tune::open_loop_of(&drive).is_some() {
+            if self.output.is_some() {
+                return Err(Failure::usage("--output has no effect on a stepper without an encoder")
+                    .because("its ramps are computed, and there is no frequency response to draw")
+                    .next("omit it"));
+            }
             let request = self.ramp_request(journal);
-            return Ok(Tuned::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?));
+            let found = Found::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?);
+            return Ok(Tuned { found, picture: None });
         }
         let (_, loops) = host::tune::loops_of(&drive)?;
         let request = self.request(journal, (loops.usual_rpm, loops.usual_a));
@@ -201,11 +210,11 @@ impl Tune {
         let released = Guard::end(guard, context, &drive, false).await;
         let report = done?;
         released?;
-        self.draw(&report.picture)?;
-        Ok(Tuned::Gains(Box::new(report)))
+        let picture = self.draw(&report.picture)?;
+        Ok(Tuned { found: Found::Gains(Box::new(report)), picture })
     }
 
-    fn of_capture(&self, path: &Path, context: &Context) -> Result<CaptureReport, Failure> {
+    fn of_capture(&self, path: &Path, context: &Context) -> Result<Tuned, Failure> {
         let unread = |reason: String| {
             Failure::bad_file(format!("the record {} has nothing of node {}", path.display(), self.node))
                 .because(reason)
@@ -217,20 +226,30 @@ impl Tune {
         if let Some(model) = known.filter(|model| !capture.model.is_empty() && capture.model != *model) {
             report.notes.push(format!("it was captured of a {}, and node {} is a {model}", capture.model, self.node));
         }
-        self.draw(&report.picture)?;
-        Ok(report)
+        let picture = self.draw(&report.picture)?;
+        Ok(Tuned { found: Found::Captured(Box::new(report)), picture })
     }
 
-    fn draw(&self, picture: &plot::Poster) -> Result<(), Failure> {
-        let Some(path) = &self.picture else { return Ok(()) };
-        std::fs::write(path, picture.to_svg()).map_err(|error| Failure::of_writing("the picture", path, &error))
+    /// Writes the picture to its file. The text of one that goes to standard output.
+    fn draw(&self, picture: &plot::Poster) -> Result<Option<String>, Failure> {
+        self.output.as_deref().map_or(Ok(None), |path| write_svg(path, picture.to_svg()))
     }
+}
+
+/// What was proposed, and its picture.
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct Tuned {
+    #[serde(flatten)]
+    found: Found,
+    /// If it goes to standard output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
 }
 
 /// What was proposed.
 #[derive(Debug, serde::Serialize)]
 #[serde(untagged)]
-pub(crate) enum Tuned {
+enum Found {
     /// Of a drive with loops.
     Gains(Box<TuneReport>),
     /// Of a stepper without an encoder.
@@ -241,10 +260,13 @@ pub(crate) enum Tuned {
 
 impl Report for Tuned {
     fn text(&self, paint: Paint) -> String {
-        match self {
-            Self::Gains(report) => report.text(paint),
-            Self::Ramps(report) => report.text(paint),
-            Self::Captured(report) => report.text(paint),
+        if let Some(picture) = &self.picture {
+            return picture.trim_end().to_owned();
+        }
+        match &self.found {
+            Found::Gains(report) => report.text(paint),
+            Found::Ramps(report) => report.text(paint),
+            Found::Captured(report) => report.text(paint),
         }
     }
 }

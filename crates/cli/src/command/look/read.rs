@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use console::command::object::ObjectReport;
 use console::command::read;
 
-use crate::command::configure::dcf::{is_stdout, keep, new_file};
+use crate::command::configure::dcf::{keep, new_file};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::{Format, Report, print};
+use crate::output::{Format, Report, is_stdout, print};
 use plot::Paint;
 use words::object::ObjectArg;
 

@@ -17,6 +17,7 @@ use crate::command::record_and_replay::plot::read_record;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::frames::stamp::absolute;
+use crate::output::refuse_json_beside;
 use plot::Paint;
 
 /// The largest file of a tuning that is read: some tens of thousands of bytes are usual.
@@ -33,7 +34,7 @@ pub(crate) struct Report {
     /// Node-ID
     #[arg(value_parser = node)]
     node: NodeId,
-    /// Write the page to this file
+    /// Write the page to this file, or with - to standard output
     #[arg(long, short, alias = "html", value_name = "FILE.html", value_parser = page_path)]
     output: PathBuf,
     /// Who makes the report
@@ -51,10 +52,10 @@ pub(crate) struct Report {
 }
 
 fn page_path(text: &str) -> Result<PathBuf, String> {
-    if text.to_ascii_lowercase().ends_with(".html") {
+    if text == "-" || text.to_ascii_lowercase().ends_with(".html") {
         Ok(text.into())
     } else {
-        Err("expected FILE.html; --json prints the report for programs as well".into())
+        Err("expected FILE.html, or - for standard output; --json prints the report for programs as well".into())
     }
 }
 
@@ -64,13 +65,17 @@ pub(crate) struct Written {
     file: String,
     #[serde(flatten)]
     report: NodeReport,
+    /// The page, if it goes to standard output.
+    #[serde(skip)]
+    page: Option<String>,
 }
 
 impl Report {
     /// Reads the node and writes the page.
     pub(crate) async fn run(&self, context: &Context) -> Result<Written, Failure> {
+        refuse_json_beside("a page", Some(&self.output), context.prints_json())?;
         // Before minutes are spent on the bus.
-        new_file(Some(&self.output), self.force)?;
+        let place = new_file(Some(&self.output), self.force)?;
         let captures = self
             .capture
             .iter()
@@ -85,8 +90,13 @@ impl Report {
         let drive = context.known_drive(self.node).await?;
         let mut report = NodeReport::read(&context.progress, &drive, made).await?;
         (report.captures, report.tunings) = (captures, tunings);
-        keep(&self.output, report.to_html().as_bytes(), self.force)?;
-        Ok(Written { file: self.output.display().to_string(), report })
+        let page = report.to_html();
+        let file = self.output.display().to_string();
+        if let Some(path) = place {
+            keep(path, page.as_bytes(), self.force)?;
+            return Ok(Written { file, report, page: None });
+        }
+        Ok(Written { file, report, page: Some(page) })
     }
 }
 
@@ -113,6 +123,9 @@ fn tuning(path: &Path, node: NodeId) -> Result<Tuning, Failure> {
 
 impl crate::output::Report for Written {
     fn text(&self, paint: Paint) -> String {
+        if let Some(page) = &self.page {
+            return page.trim_end().to_owned();
+        }
         let report = &self.report;
         let present = match (&report.fault, &report.fault_not_known) {
             (Some(fault), _) => paint.bad(&format!("fault present: {}", fault.text())),

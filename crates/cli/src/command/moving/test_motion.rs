@@ -17,7 +17,8 @@ use words::node::node;
 use super::group::AxisLimitValues;
 use crate::command::cycles::CycleArgs;
 use crate::command::record_and_replay::capture::{
-    CaptureArgs, CaptureRow, USUAL_RATE, capture_file, check_place, not_put_back, numbered, save,
+    CaptureArgs, CaptureRow, USUAL_RATE, beside_stdout, capture_file, capture_output, check_place, not_put_back,
+    numbered, save,
 };
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
@@ -72,7 +73,7 @@ pub(crate) struct TestMotion {
     /// Limit of the acceleration; steps: the drive's own ramps without it
     #[arg(long, value_name = "RATE", value_parser = rate)]
     acceleration: Option<f64>,
-    /// Turns from its start, beyond which points are refused and steps stop
+    /// Largest travel from the start; beyond it points are refused, steps stop
     #[arg(long, value_name = "TURNS", value_parser = turns)]
     travel: Option<f64>,
     /// Distance of the shaft from its set-point beyond which it is stopped
@@ -86,8 +87,8 @@ pub(crate) struct TestMotion {
     capture: Vec<String>,
     #[command(flatten)]
     how: CaptureArgs,
-    /// Write the captures to this file and NAME-2 and on, .mcap or .csv
-    #[arg(long, short, value_name = "FILE", value_parser = capture_file)]
+    /// Write the captures to this file, .mcap or .csv, and to NAME-2 and so on
+    #[arg(long, short, value_name = "FILE", value_parser = capture_output)]
     output: Option<PathBuf>,
     #[command(flatten)]
     cycles: CycleArgs,
@@ -140,7 +141,7 @@ impl TestMotion {
         let usual = if matches!(motion, Motion::Points { .. }) { self.period } else { USUAL_RATE };
         let wanted = self.how.wanted(context, &drive, &names, usual).await?;
         wanted.check(&motion.span())?;
-        check_place(self.output.as_deref(), self.count)?;
+        check_place(context, self.output.as_deref(), self.count)?;
         let guard = self.guard.begin(context, &drive).await?;
         let moved = self.measured(context, (&drive, &motion), &wanted).await;
         let released = guard.end(context, &drive, false).await;
@@ -151,7 +152,10 @@ impl TestMotion {
             ShapeName::Steps => AxisLimitValues::of_ramps(&limits, self.acceleration.map(|rate| rate * 60.0)),
             _ => (&limits).into(),
         };
-        Ok(TestMotionReport { node: self.node.raw(), shape: self.shape_name().to_owned(), limits, guard, runs, notes })
+        let shape = self.shape_name().to_owned();
+        let report = TestMotionReport { node: self.node.raw(), shape, limits, guard, runs, notes };
+        beside_stdout(context, self.output.as_deref(), || report.shown(Paint::OFF));
+        Ok(report)
     }
 
     const fn shape_name(&self) -> &'static str {
@@ -276,6 +280,14 @@ fn read(path: &Path) -> Result<Capture, String> {
 
 impl Report for TestMotionReport {
     fn text(&self, paint: Paint) -> String {
+        // The capture is there already, and nothing else is to be in it.
+        let on_stdout = self.runs.iter().any(|run| run.capture.is_on_stdout());
+        if on_stdout { String::new() } else { self.shown(paint) }
+    }
+}
+
+impl TestMotionReport {
+    fn shown(&self, paint: Paint) -> String {
         let Self { node, shape, limits, guard, runs, notes } = self;
         let mut lines = vec![format!("node {node}: {shape}, {}", words::counted(runs.len(), "run"))];
         lines.push(format!("  limits  {}", limits.text()));

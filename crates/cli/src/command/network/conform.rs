@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::context::{Context, Restorer};
 use crate::failure::{Failure, refuse_missing_folder};
 use crate::global::Global;
-use crate::output::{Format, Report, file_path};
+use crate::output::{Format, Report, html_path, junit_path};
 use crate::session;
 use plot::{Paint, Table};
 use words::models::{Description, is_from_file, resolve};
@@ -49,10 +49,10 @@ pub(crate) struct Conform {
     #[arg(long, conflicts_with_all = ["node", "allow_motion", "allow_store"])]
     list: bool,
     /// Also write the report as one page of HTML
-    #[arg(long, value_name = "FILE", value_parser = file_path)]
+    #[arg(long, value_name = "FILE.html", value_parser = html_path)]
     html: Option<PathBuf>,
     /// Also write the result as JUnit XML, as build servers read it
-    #[arg(long, value_name = "FILE", value_parser = file_path)]
+    #[arg(long, value_name = "FILE.xml", value_parser = junit_path)]
     junit: Option<PathBuf>,
 }
 

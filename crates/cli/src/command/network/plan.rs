@@ -22,7 +22,7 @@ use crate::session;
 use plot::Paint;
 use plot::Table;
 
-/// Plan a bus: load, longest time of every frame, number of such drives it carries
+/// Plan a bus: bus load, worst-case delay of every frame, how many such drives fit
 ///
 /// Takes the frames from the PDO configuration of the nodes: of virtual drives of a machine file, or of those on a real
 /// bus, which is only read. The [[group]] or the [base] of the file is planned as it will run, with its period, its
@@ -218,7 +218,7 @@ impl Report for PlanReport {
         let moved = self.moved.iter().map(|moved| format!(", {moved} of the machine file")).collect::<String>();
         lines.push(format!("{} {verdict} at a cycle of {cycle}{moved}", paint.strong("verdict")));
         lines.push(format!(
-            "{} {} like these at this cycle ({} while there is no SDO and no EMCY); here are {}",
+            "{} {} such drives at this cycle ({} without SDO and EMCY); {} are planned",
             paint.strong("room for"),
             self.most_drives,
             self.most_drives_in_cycle,

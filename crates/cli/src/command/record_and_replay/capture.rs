@@ -20,7 +20,7 @@ use crate::command::configure::params::journal::{default_path, note_kept};
 use crate::command::repeat::period;
 use crate::context::{Context, Restorer};
 use crate::failure::Failure;
-use crate::output::{Report, file_path};
+use crate::output::{Report, file_path, is_stdout, refuse_json_beside, stdout_file};
 use crate::plain::plain;
 use console::numbers::whole;
 use plot::{Paint, Table};
@@ -58,8 +58,9 @@ pub(crate) struct Capture {
     /// Captures to take, one after the other; each has a file of its own, NAME-2 and on
     #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1..=999_u32), default_value = "1")]
     count: u32,
-    /// Write to this file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced
-    #[arg(long, short, value_name = "FILE", value_parser = capture_file)]
+    /// Write to this file, NAME.mcap or NAME.csv: new, empty, or an earlier record, which is replaced; - writes CSV to
+    /// standard output
+    #[arg(long, short, value_name = "FILE", value_parser = capture_output)]
     output: Option<PathBuf>,
     /// Name of the capture (default: that of its file)
     #[arg(long, value_name = "TEXT")]
@@ -69,13 +70,13 @@ pub(crate) struct Capture {
     notes: String,
 }
 
-/// Time between two readings without another wish.
+/// Time between two readings, where none is given.
 pub(in crate::command) const USUAL_RATE: Duration = Duration::from_millis(1);
 
 /// How it is captured.
 #[derive(Debug, clap::Args)]
 pub(in crate::command) struct CaptureArgs {
-    /// Time between two readings, or how many there are: 1ms, 500Hz (default: 1ms; of points in cycles, their period)
+    /// Sampling period or rate: 1ms, 500Hz (default: 1ms; of points in cycles, their period)
     #[arg(long, value_name = "TIME", value_parser = rate)]
     rate: Option<Duration>,
     /// Use this TPDO too, although it is in use: tpdo1; its listeners miss it meanwhile
@@ -94,6 +95,14 @@ pub(in crate::command) struct CaptureArgs {
 
 pub(in crate::command) fn capture_file(text: &str) -> Result<PathBuf, String> {
     Kind::of_name(text).map(|_| text.into()).ok_or_else(|| "a capture is called NAME.mcap or NAME.csv".to_owned())
+}
+
+/// A capture that is written.
+pub(in crate::command) fn capture_output(text: &str) -> Result<PathBuf, String> {
+    if text == "-" {
+        return Ok(text.into());
+    }
+    capture_file(text).map_err(|error| format!("{error}, or - for standard output"))
 }
 
 /// `1ms`, or `500Hz`.
@@ -118,7 +127,7 @@ pub(crate) struct CaptureReport {
     pace: Option<String>,
     /// Share of the bus's time that this node's TPDOs and SYNC take at most.
     load: Option<f64>,
-    /// By what the node was seen to be pre-operational again (`heartbeat`, `silence`, `nothing`); null where it was operational before.
+    /// By what the node was seen to be pre-operational again (`heartbeat`, `no more frames`, `nothing`); null where it was operational before.
     nmt_back: Option<&'static str>,
     #[serde(skip)]
     left_operational: Option<SeenBy>,
@@ -192,7 +201,7 @@ impl Capture {
         let (trigger, pre_trigger) = (self.trigger.clone(), self.pre_trigger);
         let span = Span { duration: self.duration, trigger, pre_trigger };
         wanted.check(&span)?;
-        check_place(self.output.as_deref(), self.count)?;
+        check_place(context, self.output.as_deref(), self.count)?;
         context.progress.show(format!("node {}: setting its TPDOs up", self.node));
         let restorer = host::capture::Restorer::of(&drive);
         context.restore_at_end(Restorer::Capture(restorer.clone()));
@@ -206,7 +215,10 @@ impl Capture {
         report.left_operational = restorer.left_operational();
         report.nmt_back = report.left_operational.map(SeenBy::word);
         let failure = match failure.or(not_put_back(self.node, &left)) {
-            None => return Ok(report),
+            None => {
+                beside_stdout(context, self.output.as_deref(), || report.shown(Paint::OFF));
+                return Ok(report);
+            }
             Some(failure) => failure,
         };
         let failure = left.iter().fold(failure, |failure, left| failure.because(format!("not put back: {left}")));
@@ -225,7 +237,11 @@ impl Capture {
                 Err(failure) => return (rows, Some(failure.into())),
             };
             let file = self.output.as_deref().map(|path| numbered(path, number));
-            let of_file = file.as_deref().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
+            let of_file = file
+                .as_deref()
+                .filter(|path| !is_stdout(path))
+                .and_then(Path::file_stem)
+                .map(|stem| stem.to_string_lossy().into_owned());
             capture.name = self.name.clone().or(of_file).unwrap_or_default();
             capture.notes.clone_from(&self.notes);
             if let Some(Err(failure)) = file.as_deref().map(|path| save(&capture, path)) {
@@ -251,7 +267,15 @@ pub(in crate::command) fn numbered(path: &Path, number: u32) -> PathBuf {
 }
 
 /// Refuses files that [`save`] could not write, as they are at present, before anything is captured for them.
-pub(in crate::command) fn check_place(path: Option<&Path>, count: u32) -> Result<(), Failure> {
+pub(in crate::command) fn check_place(context: &Context, path: Option<&Path>, count: u32) -> Result<(), Failure> {
+    refuse_json_beside("a capture", path, context.prints_json())?;
+    if path.is_some_and(is_stdout) {
+        return match count {
+            1 => Ok(()),
+            _ => Err(Failure::usage("standard output takes one capture, and --count asks for several")
+                .next("give --output a file: further captures are NAME-2, NAME-3")),
+        };
+    }
     for path in path.iter().flat_map(|path| (1..=count).map(|number| numbered(path, number))) {
         check_record(&path, kind_of(&path)).map_err(|error| Failure::of_writing("the capture", &path, &error))?;
     }
@@ -264,6 +288,14 @@ pub(in crate::command) fn not_put_back(node: NodeId, left: &[String]) -> Option<
     host::capture::not_put_back(node, left).map(|failure| Failure::from(failure).next(next))
 }
 
+/// What is reported beside a capture on standard output, where nothing else is to be: a note for people.
+pub(in crate::command) fn beside_stdout(context: &Context, path: Option<&Path>, text: impl FnOnce() -> String) {
+    if path.is_some_and(is_stdout) {
+        context.progress.clear();
+        context.note(&text());
+    }
+}
+
 /// By the name, which [`capture_file`] has looked at.
 fn kind_of(path: &Path) -> Kind {
     Kind::of_name(&path.to_string_lossy()).unwrap_or(Kind::Csv)
@@ -272,7 +304,8 @@ fn kind_of(path: &Path) -> Kind {
 /// Writes a capture to its file.
 pub(in crate::command) fn save(capture: &Captured, path: &Path) -> Result<(), Failure> {
     let kind = kind_of(path);
-    let written = create_record(path, kind).and_then(|file| capture.write(kind, Box::new(file)));
+    let file = if is_stdout(path) { stdout_file() } else { create_record(path, kind) };
+    let written = file.and_then(|file| capture.write(kind, Box::new(file)));
     written.map_err(|error| Failure::of_writing("the capture", path, &error))
 }
 
@@ -326,6 +359,14 @@ impl TraceRow {
 
 impl Report for CaptureReport {
     fn text(&self, paint: Paint) -> String {
+        // The capture is there already, and nothing else is to be in it.
+        let on_stdout = self.captures.iter().any(CaptureRow::is_on_stdout);
+        if on_stdout { String::new() } else { self.shown(paint) }
+    }
+}
+
+impl CaptureReport {
+    fn shown(&self, paint: Paint) -> String {
         let mut parts = Vec::new();
         for row in &self.captures {
             parts.push(row.text(paint));
@@ -343,6 +384,10 @@ impl Report for CaptureReport {
 }
 
 impl CaptureRow {
+    pub(in crate::command) fn is_on_stdout(&self) -> bool {
+        self.file.as_deref().is_some_and(|file| is_stdout(Path::new(file)))
+    }
+
     pub(in crate::command) fn text(&self, paint: Paint) -> String {
         let name = self.file.as_deref().unwrap_or("not saved (-o FILE)");
         let trigger = self.trigger_s.map_or_else(String::new, |at| format!(", trigger at {at:.4} s"));

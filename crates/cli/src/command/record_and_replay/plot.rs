@@ -12,12 +12,11 @@ use serde::Serialize;
 use words::counted;
 use words::document::read_bytes;
 
-use crate::command::configure::dcf::is_stdout;
 use crate::command::look::dump::open_log;
 use crate::failure::Failure;
 use crate::frames::decoder;
 use crate::global::Global;
-use crate::output::Report;
+use crate::output::{Report, is_stdout};
 use plot::Paint;
 
 /// Draw a record of --record: a figure for each node, a panel for each quantity

@@ -1,6 +1,5 @@
 //! `ferrodrive record`: objects of nodes over time, on any bus, into a file that `plot` and Foxglove read.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -20,12 +19,11 @@ use words::counted;
 use words::node::node;
 use words::object::{ObjectArg, object};
 
-use crate::command::configure::dcf::is_stdout;
 use console::command::object::resolve;
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
+use crate::output::{Report, is_stdout, refuse_json_beside, stdout_file};
 use crate::recording::ViewerOptions;
 use plot::Paint;
 use serve::files::create_record;
@@ -72,15 +70,6 @@ fn record_file(text: &str) -> Result<(PathBuf, Kind), String> {
     let kind =
         Kind::of_name(text).ok_or("a record is called NAME.mcap or NAME.csv; for frames alone there is --log")?;
     Ok((text.into(), kind))
-}
-
-/// Standard output as a file of its own.
-fn stdout_file() -> std::io::Result<File> {
-    #[cfg(unix)]
-    let own = std::os::fd::AsFd::as_fd(&std::io::stdout()).try_clone_to_owned();
-    #[cfg(windows)]
-    let own = std::os::windows::io::AsHandle::as_handle(&std::io::stdout()).try_clone_to_owned();
-    own.map(File::from)
 }
 
 /// An SDO takes some hundred microseconds.
@@ -133,10 +122,7 @@ pub(crate) struct RecordReport {
 impl Record {
     /// Records until the time is over.
     pub(crate) async fn run(&self, context: &Context) -> Result<RecordReport, Failure> {
-        if context.prints_json() && is_stdout(&self.out.0) {
-            return Err(Failure::usage("a record and lines of JSON cannot both go to standard output")
-                .next("give --output NAME.csv, or omit --json"));
-        }
+        refuse_json_beside("a record", Some(&self.out.0), context.prints_json())?;
         if self.viewers.is_asked_for() && context.is_embedded() {
             return Err(Failure::usage("--foxglove has no meaning where virtual time does not follow the clock")
                 .because("this record is over before anyone could look")

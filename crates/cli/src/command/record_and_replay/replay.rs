@@ -1,4 +1,4 @@
-//! `ferrodrive replay`: the frames of a log, sent again at the distance in time that they had.
+//! `ferrodrive replay`: the frames of a log, replayed with their original timing.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

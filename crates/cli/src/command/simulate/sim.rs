@@ -9,7 +9,6 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::Mux;
-use serve::control::ControlServer;
 use serve::eeprom::Eeproms;
 use serve::messages::Messages;
 use serve::pacer::{Clock, Pacer, Speed};
@@ -28,7 +27,7 @@ use transport::{
 use crate::embedded;
 use crate::failure::Failure;
 use crate::global::Global;
-use crate::output::file_path;
+use crate::output::{file_path, ready_line};
 use crate::plain::plain;
 use crate::recording::{LogPath, RecordOptions};
 use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
@@ -315,7 +314,11 @@ impl Sim {
         let full = requests.clone();
         world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
-        answers.say(&self.ready(&hub, modbus.as_ref(), control.as_ref(), bridge));
+        let places = hub.listeners().iter().map(ToString::to_string);
+        let places = places.chain(modbus.iter().map(|server| server.place().to_string()));
+        let places = places.chain(control.iter().map(|server| server.place().to_string()));
+        let places: Vec<_> = places.chain(bridge.iter().map(ToString::to_string)).collect();
+        answers.say(&ready_line(global.json, &places));
         if self.places.is_empty() && modbus.is_none() && control.is_none() && bridge.is_none() {
             service.warnings.say(UNREACHABLE);
         }
@@ -332,21 +335,6 @@ impl Sim {
             control.part(PARTING_PATIENCE).await;
         }
         ended
-    }
-
-    /// The line with the addresses at which the bus can be reached.
-    fn ready(
-        &self,
-        hub: &Hub,
-        modbus: Option<&ModbusServer>,
-        control: Option<&ControlServer>,
-        bridge: Option<&BusSpec>,
-    ) -> String {
-        let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
-        let modbus = modbus.map(|server| format!(" {}", server.place()));
-        let control = control.map(|server| format!(" {}", server.place()));
-        let bridge = bridge.map(|bus| format!(" {bus}"));
-        ["ready".to_owned()].into_iter().chain(listeners).chain(modbus).chain(control).chain(bridge).collect()
     }
 
     /// The server of `--modbus`, listening.

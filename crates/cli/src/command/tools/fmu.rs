@@ -15,7 +15,7 @@ use zip::write::SimpleFileOptions;
 
 use crate::command::configure::dcf::{keep, new_file};
 use crate::failure::Failure;
-use crate::output::Report;
+use crate::output::{Report, is_stdout, print, refuse_json_beside};
 use crate::plain::plain;
 
 /// The library without what systems add to its name.
@@ -37,7 +37,7 @@ pub(crate) struct Fmu {
     /// The drive, as `sim --drive` takes it, or `bus`
     #[arg(value_name = "MODEL@NODE[,KEY=VALUE..]")]
     what: String,
-    /// Write to this file
+    /// Write to this file, or with - to standard output
     #[arg(long, short, value_name = "FILE.fmu", value_parser = fmu_path)]
     output: PathBuf,
     /// Version of FMI: 3 with a CAN terminal, or 2 with a master inside
@@ -69,7 +69,11 @@ pub(crate) struct Fmu {
 }
 
 fn fmu_path(text: &str) -> Result<PathBuf, String> {
-    if text.to_ascii_lowercase().ends_with(".fmu") { Ok(text.into()) } else { Err("expected FILE.fmu".into()) }
+    if text == "-" || text.to_ascii_lowercase().ends_with(".fmu") {
+        Ok(text.into())
+    } else {
+        Err("expected FILE.fmu, or - for standard output".into())
+    }
 }
 
 fn clock(text: &str) -> Result<TxClock, String> {
@@ -104,6 +108,10 @@ pub(crate) struct FmuReport {
 
 impl Report for FmuReport {
     fn text(&self, _: Paint) -> String {
+        // The file is there already, and nothing else is to be in it.
+        if is_stdout(Path::new(&self.file)) {
+            return String::new();
+        }
         let variables = counted(self.variables, "variable");
         let terminals = match self.terminals.as_slice() {
             [] => "with a master".to_owned(),
@@ -115,8 +123,9 @@ impl Report for FmuReport {
 
 impl Fmu {
     /// Packs it.
-    pub(crate) fn run(&self) -> Result<FmuReport, Failure> {
-        let path = new_file(Some(&self.output), self.force)?.unwrap_or(&self.output);
+    pub(crate) fn run(&self, json: bool) -> Result<FmuReport, Failure> {
+        refuse_json_beside("an FMU", Some(&self.output), json)?;
+        let path = new_file(Some(&self.output), self.force)?;
         let (config, folder) = self.config()?;
         let library = self.library()?;
         let named = if self.fmi == 2 { platform_of_fmi2() } else { platform() };
@@ -128,9 +137,12 @@ impl Fmu {
         let unit = fmu::unit::Unit::new(&config, folder).map_err(not_packed)?;
         let files = entries(&config, folder, (&name, library)).map_err(not_packed)?;
         let archive = archived(&files).map_err(|error| Failure::new("cannot pack the archive").because(error))?;
-        keep(path, &archive, self.force)?;
+        match path {
+            Some(path) => keep(path, &archive, self.force)?,
+            None => print(&archive).map_err(Failure::of_stdout)?,
+        }
         Ok(FmuReport {
-            file: path.display().to_string(),
+            file: self.output.display().to_string(),
             kind: match config {
                 Config::Bus(_) => "bus",
                 Config::Drive(_) => "drive",
@@ -148,10 +160,8 @@ impl Fmu {
             return Err(Failure::usage("--clock is about a CAN terminal, which FMI 2.0 does not have").next("omit it"));
         }
         if self.fmi == 3 && self.mode.is_some() {
-            return Err(Failure::usage(
-                "--mode is what the master of a drive gives it, and with --fmi 3 there is none inside",
-            )
-            .next("add --fmi 2, or omit --mode"));
+            return Err(Failure::usage("--mode needs a master inside the FMU, which FMI 3 does not have")
+                .next("add --fmi 2, or omit --mode"));
         }
         if self.fmi == 2 && self.what == "bus" {
             return Err(Failure::usage("a bus needs FMI 3.0: FMI 2.0 has neither clocks nor binary variables")

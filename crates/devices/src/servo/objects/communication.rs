@@ -76,7 +76,7 @@ const GENERAL: [Entry; 49] = [
     rw(0x1016, 8, U32).described("Eighth node watched, and how long it may be silent").saved(),
     rw(0x1017, 0, U16).described("Time between two heartbeats; 0 is off").unit("ms").saved(),
     ro(0x1018, 0, U8).default(4),
-    // No vendor of CiA: 0 is not given to anybody.
+    // No vendor of CiA: 0 is not assigned.
     ro(0x1018, 1, U32),
     ro(0x1018, 2, U32).default(402),
     ro(0x1018, 3, U32).default(0x0001_0000),

@@ -220,7 +220,7 @@ impl Servo {
         self.electrical_turns = electrical_turns;
     }
 
-    /// The current that flows is none of the load's: the loops begin without it.
+    /// The current that flows is not due to the load: the loops begin without it.
     pub fn forget_current(&mut self) {
         self.cascade.reset(0.0);
         self.setpoint_a = 0.0;

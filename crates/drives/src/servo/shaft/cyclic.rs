@@ -123,7 +123,7 @@ pub(super) struct Waiting {
 }
 
 impl Waiting {
-    /// An empty buffer of so many places; less than two is none: each set-point acts as it comes.
+    /// An empty buffer of so many places; less than two do not make a buffer: each set-point acts as it comes.
     pub(super) const fn none(size: u8, organisation: Organisation) -> Self {
         Self { places: [0; MOST_WAITING], filled: 0, next: 0, size, organisation }
     }

@@ -29,7 +29,7 @@ pub enum ServiceKind {
     Heartbeat,
     /// Layer setting services.
     Lss,
-    /// What is none of these.
+    /// Anything else.
     Other,
 }
 

@@ -188,7 +188,7 @@ fn host_watch(seen: &Observed) -> Option<Finding> {
                 cause(TOPIC, "host_silent", [
                     format!("A frame for it at least every {} ms ({})", limit.as_millis(), seen.named(time)),
                     format!("None for {} of the {} ms listened", silence.as_millis(), listened.as_millis()),
-                    "It takes its host for dead and stops".to_owned(),
+                    "It considers its host dead and stops".to_owned(),
                     "Send it something more often (an RPDO, a read of its statusword); what moves it with ferrodrive does \
                      so by itself"
                         .to_owned(),
@@ -208,15 +208,13 @@ fn heartbeat_of_host(seen: &Observed, consumer: Mux) -> Option<Finding> {
     let (heard, node) = (seen.heard.heartbeats(host).map_or(0, |heard| heard.count), seen.node);
     let (follows, remedy) = if seen.is_live() {
         (
-            "It takes its host for dead and has stopped; with the next heartbeat it goes on with what was commanded before",
-            format!(
-                "End its old motion (ferrodrive quick-stop {node}), then have node {host} send its heartbeat again"
-            ),
+            "It considers its host dead and has stopped; with the next heartbeat it resumes what was commanded before",
+            format!("End its old motion (ferrodrive quick-stop {node}), then restart the heartbeat of node {host}"),
         )
     } else {
         (
-            "It takes its host for dead and has stopped",
-            format!("Have node {host} send its heartbeat again, then: ferrodrive reset {node}"),
+            "It considers its host dead and has stopped",
+            format!("Restart the heartbeat of node {host}, then: ferrodrive reset {node}"),
         )
     };
     (seen.has_lost_host() && limit_ms > 0).then(|| {

@@ -124,7 +124,7 @@ fn sent_by_rpdo(seen: &Observed) -> Option<Sent<'_>> {
 }
 
 /// What is written by SDO lasts until the next frame of an RPDO with the controlword. Frames of which the drive has nothing in 6040h
-/// are no cause.
+/// are not a cause.
 fn by_rpdo(seen: &Observed, sent: &Sent<'_>, state: PowerState) -> Option<Finding> {
     let Sent { controlword, config, id, count } = *sent;
     let acts = seen.controlword().is_none_or(|has| has == controlword);
@@ -195,7 +195,7 @@ fn not_enabled(seen: &Observed, state: PowerState, statusword: Statusword) -> Op
         PowerState::NotReadyToSwitchOn => (
             "not_ready",
             "It is busy with its start or self-test and takes no controlword yet",
-            "Wait; look at its supply if it stays so".to_owned(),
+            "Wait; if it persists, check the supply".to_owned(),
         ),
         PowerState::QuickStopActive if !controlword.has(Controlword::QUICK_STOP) => (
             "quick_stop",

@@ -215,7 +215,7 @@ fn relative_reached(seen: &Observed, object: &str, found: String) -> Finding {
 fn software_limit(seen: &Observed) -> Option<Finding> {
     let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
     let target = seen.axis_value(TARGET_POSITION)?;
-    // A distance is none of the positions that are limited.
+    // The limits are for positions, and this is a distance.
     let relative = seen.controlword().is_some_and(|controlword| controlword.has(Controlword::RELATIVE));
     (!relative && low < high && !(low..=high).contains(&target)).then(|| {
         cause(

@@ -15,6 +15,7 @@ use master::Network;
 use master::base::Twist;
 use master::drive::{MotionOptions, StopWay, StoppedAxis};
 use master::units::Rpm;
+use sim::wire::WireEvent;
 use sim::{Place, Stimulus, block_on};
 
 use super::{Bench, Moving, NODES, PERIOD, models, options};
@@ -128,6 +129,39 @@ fn process_data_of_another_master_do_not_set_a_drive_going_again() {
         let stopped = block_on(&mut bench.world, while_going_on(stop, keep_going(feeder))).unwrap();
         assert!(stopped.len() == 2 && stopped.iter().all(|axis| axis.outcome.is_ok()), "{name}: {stopped:?}");
         assert!(bench.fastest() < 1.0, "{name}: {} r/min", bench.fastest());
+    }
+}
+
+/// All at once: no drive waits for the answer of another.
+#[test]
+fn known_drives_have_their_stop_before_either_answers() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        bench.turn();
+        let other = bench.other();
+        for number in NODES {
+            let late = "bus late 5 6".parse::<Stimulus>().unwrap();
+            bench.world.apply(Place::node(number), &late).unwrap().unwrap();
+        }
+        let known = NODES.map(|number| (node(number), model(name).unwrap())).into_iter().collect();
+        let began = bench.world.now();
+        let stopped = bench.run(other.stop_everything(&known));
+        assert_eq!(stopped.len(), NODES.len(), "{name}: {stopped:?}");
+        let frames = bench.world.log().iter().filter_map(|event| match event {
+            WireEvent::Frame { start, frame, .. } if *start >= began => Some(*frame),
+            _ => None,
+        });
+        let frames: Vec<_> = frames.collect();
+        let is_from = |frame: &Frame, service: u16| {
+            NODES.iter().any(|number| frame.id() == CanId::standard(service + u16::from(*number)))
+        };
+        let answer = frames.iter().position(|frame| is_from(frame, 0x580)).expect("they answer");
+        // SDO download of 6040h to each (CiA 301, 7.2.4.3.3), and before it one NMT command to all.
+        let is_stop = |frame: &&Frame| is_from(frame, 0x600) && frame.data()[1..4] == [0x40, 0x60, 0];
+        let mut stops: Vec<_> = frames[..answer].iter().filter(is_stop).map(Frame::id).collect();
+        stops.dedup();
+        assert_eq!(stops.len(), NODES.len(), "{name}: {frames:?}");
+        assert_eq!((frames[0].id(), frames[0].data()), (CanId::standard(0), &[0x80, 0][..]), "{name}");
     }
 }
 

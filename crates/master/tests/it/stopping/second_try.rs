@@ -46,7 +46,7 @@ fn a_drive_that_is_reached_again_is_stopped_by_a_second_try() {
         let after = stopped.outcome.clone().unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(after >= GONE, "{name}: {after:?}");
         assert!(after + PERIOD >= bench.world.now() - began, "{name}: {after:?} since the first try");
-        // What it would have done without this program, for who reports a stop that was not seen.
+        // What it would have done without this program, for the report of a stop that was not seen.
         let watch = model(name).unwrap().host_watch;
         assert_eq!(stopped.loss.is_some(), watch != HostWatch::None, "{name}: {stopped:?}");
         assert!(bench.fastest() < 1.0 && bench.network.moved().is_empty(), "{name}");
@@ -61,7 +61,7 @@ fn a_chosen_server_is_used_from_the_first_request_on_and_delays_no_stop() {
     let drive = master::Drive::new(network.node(node(4)), model("zlac8030l").unwrap());
     network.choose_sdo_servers([(node(4), 0x1201)]);
     let models = [(node(4), model("zlac8030l").unwrap())].into();
-    // For who may stop drives and do no more; and with the NMT state of every node.
+    // For callers that may only stop drives; and with the NMT state of every node.
     let mut axes = bus.block_on(network.quick_stop_everything(&models));
     assert!(bus.frames().iter().all(|frame| !frame.starts_with("000#")), "no NMT command");
     axes.extend(bus.block_on(network.stop_everything(&models)));

@@ -47,7 +47,7 @@ pub enum MergeError<E> {
 ///
 /// # Errors
 /// That the parts are not those of this sweep, each whole and there once; before the first result is handed out, but for what is
-/// found on the way: a line that is none, and an early end.
+/// found on the way: a line that cannot be read, and an early end.
 pub fn merge<R: BufRead, E>(
     sweep: &Sweep,
     parts: impl IntoIterator<Item = R>,

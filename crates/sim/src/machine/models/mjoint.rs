@@ -33,9 +33,9 @@ use crate::machine::kernel::realism::{
 use crate::{Component, Levels, OutputShaft, PulseTrain, Refused, Report, VirtualDrive};
 
 /// What has been destroyed, and what to do about it.
-const SEIZED: &str = "bearing of the reducer seized by over-speed: 'rotor free' puts in a new reducer";
-const SLIPPED: &str = "teeth of the reducer jumped, its output stands elsewhere: 'rotor free' puts in a new reducer";
-const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
+const SEIZED: &str = "bearing of the reducer seized by over-speed: 'rotor free' fits a new reducer";
+const SLIPPED: &str = "teeth of the reducer jumped, its output stands elsewhere: 'rotor free' fits a new reducer";
+const BURNT: &str = "power stage burnt: 'fault bridge off' fits a new one, 'power cycle' starts it";
 
 const OUTPUTS: &[&str] = &["ZO", "WR", "RED", "GREEN"];
 const SUPPLY_V: f64 = 36.0;

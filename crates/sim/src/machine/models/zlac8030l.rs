@@ -43,8 +43,8 @@ const BRAKE_NM: f64 = 6.0;
 
 /// What has been destroyed, and what to do about it.
 const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
-const BURNT: &str = "power stage burnt: 'fault bridge off' puts in a new one, 'power cycle' starts it";
-const BLEEDER_BURNT: &str = "bleeder resistor burnt, it takes no power: 'fault bleeder off' puts in a new one";
+const BURNT: &str = "power stage burnt: 'fault bridge off' fits a new one, 'power cycle' starts it";
+const BLEEDER_BURNT: &str = "bleeder resistor burnt, it takes no power: 'fault bleeder off' fits a new one";
 
 /// A ZLAC8030L with its wheel, as a station of a world.
 pub type Zlac8030lMachine = Machine<HubWheel>;

@@ -38,7 +38,7 @@ const SUPPLY_V: f64 = 24.0;
 
 /// What has been destroyed, and what to do about it.
 const SEIZED: &str = "bearings seized by over-speed: 'rotor free' puts in new ones";
-const BURNT: &str = "a transistor of the bridges has burnt: 'fault bridge off' puts in a new board";
+const BURNT: &str = "a transistor of the bridges has burnt: 'fault bridge off' fits a new board";
 
 /// Length of the longer motor's body, mm.
 const LONG: u16 = 82;

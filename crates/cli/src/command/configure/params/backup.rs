@@ -4,10 +4,10 @@ use host::network::params::{BackupReport, back_up, bytes_of};
 use machine::parameters::{Form, sheet};
 use words::counted;
 
-use crate::command::configure::dcf::{is_stdout, keep, new_file, of_parameters};
+use crate::command::configure::dcf::{keep, new_file, of_parameters};
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
+use crate::output::{Report, is_stdout};
 use crate::plain::plain;
 use plot::Paint;
 

@@ -65,11 +65,8 @@ const KEY_POLL: Duration = Duration::from_millis(100);
 impl Top {
     /// Shows until `q`, or until the terminal or the bus is gone.
     pub(crate) async fn run(&self, context: &Context, format: Format) -> Result<(), Failure> {
-        if format.json || !stdin().is_terminal() || !stdout().is_terminal() {
-            let failure = Failure::usage("not a terminal that can be drawn on");
-            let failure =
-                if format.json { failure.because("--json is for programs, and this is for people") } else { failure };
-            return Err(failure
+        if !stdin().is_terminal() || !stdout().is_terminal() {
+            return Err(Failure::usage("not a terminal that can be drawn on")
                 .next("ferrodrive watch NODE OBJECT .. --json prints what changes, a line each")
                 .next("ferrodrive studio serves the same as a page and as /api/state"));
         }

@@ -18,7 +18,7 @@ use scenario::{Kept, Outcome, Runner, Scenario};
 use sim::Fidelity;
 
 use crate::failure::Failure;
-use crate::output::{Format, file_path};
+use crate::output::{Format, is_stdout, junit_path, refuse_json_beside};
 use crate::plain::plain;
 use crate::progress::Progress;
 use crate::recording::RecordOptions;
@@ -64,7 +64,7 @@ pub(crate) struct Run {
     /// Make a part of the runs: the I-th of N. Each meets each value, and --merge puts them together
     #[arg(long, value_name = "I/N", requires = "seeds", hide_short_help = true)]
     shard: Option<Shard>,
-    /// Also write the result of each run to this file, a line of JSON each
+    /// Also write the result of each run to this file, or with - to standard output, a line of JSON each
     #[arg(long = "output", short = 'o', alias = "out", value_name = "NAME.jsonl", requires = "seeds", value_parser = results_path)]
     output: Option<PathBuf>,
     /// Go on with the runs after those whose results are in the output file, if it is there
@@ -82,7 +82,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "N", conflicts_with = "seeds", hide_short_help = true, value_parser = |text: &str| whole(text, 1..=64_u8))]
     threads: Option<u8>,
     /// Also write the result as JUnit XML, as build servers read it
-    #[arg(long, value_name = "FILE", conflicts_with = "seeds", value_parser = file_path)]
+    #[arg(long, value_name = "FILE.xml", conflicts_with = "seeds", value_parser = junit_path)]
     junit: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordOptions,
@@ -138,6 +138,11 @@ impl Run {
             return Err(Failure::usage("--serve and --control serve one run, and a sweep has many")
                 .next("give --seed in place of --seeds, or omit --serve"));
         }
+        refuse_json_beside("the results", self.output.as_deref(), format.json)?;
+        if self.resume && self.output.as_deref().is_some_and(is_stdout) {
+            return Err(Failure::usage("--resume needs the file with the results that are there")
+                .next("give --output NAME.jsonl, or omit --resume"));
+        }
         let sweep = Sweep::new(scenario, seeds.clone()).map_err(|reason| {
             Failure::usage("cannot sweep").because(reason).next("give --seeds 1..1000, and fewer values to [sweep]")
         })?;
@@ -181,7 +186,7 @@ impl Run {
     /// One run, with what is written about it.
     fn once(&self, scenario: &Scenario, file: &Path, format: Format) -> Result<(), Failure> {
         let (outcome, ended) = if self.serving.is_asked_for() {
-            self.serving.run(scenario, self.seed, self.threads(), &self.recording, file)?
+            self.serving.run(scenario, self.seed, self.threads(), &self.recording, (file, format.json))?
         } else {
             (self.in_virtual_time(scenario, file, format)?, Ok(()))
         };
@@ -237,10 +242,10 @@ fn batch(runner: &mut Runner) -> Batch {
 
 /// Where the results of a sweep go.
 fn results_path(text: &str) -> Result<PathBuf, String> {
-    if text.ends_with(".jsonl") {
+    if text == "-" || text.ends_with(".jsonl") {
         return Ok(text.into());
     }
-    Err("the results of a sweep go to NAME.jsonl; --json prints the summary for programs".into())
+    Err("expected NAME.jsonl, or - for standard output; --json prints the summary for programs".into())
 }
 
 /// `torque=1.5`.

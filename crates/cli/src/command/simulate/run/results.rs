@@ -10,6 +10,7 @@ use scenario::sweep::{Shard, Summary, Sweep};
 use transport::WallClock;
 
 use crate::failure::Failure;
+use crate::output::{is_stdout, stdout_file};
 
 /// What a power failure may cost. A process that is killed loses nothing of what it has written.
 const SYNCED_EVERY: Duration = Duration::from_secs(1);
@@ -32,10 +33,16 @@ impl ResultsFile {
         summary: &mut Summary,
     ) -> Result<(Self, u64), Failure> {
         let failed = |error: std::io::Error| Failure::of_writing("the results", path, &error);
+        if is_stdout(path) {
+            let (file, clock) = (stdout_file().map_err(failed)?, WallClock::start());
+            let mut results = Self { path: path.to_owned(), file, synced: clock.now(), clock };
+            results.append(&head(sweep, sweep.shard()))?;
+            return Ok((results, 0));
+        }
         let mut file = if resume {
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?
         } else {
-            create(path, "--resume goes on with it; else remove it, or give another --output")?
+            create(path, "--resume continues it; otherwise remove it, or give another --output")?
         };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
@@ -68,10 +75,17 @@ impl ResultsFile {
     /// Returns when all of it is on the disk.
     pub(super) fn finish(&mut self) -> Result<(), Failure> {
         self.synced = self.clock.now();
+        // What is written to a pipe or a terminal is there at once.
+        if is_stdout(&self.path) {
+            return Ok(());
+        }
         self.file.sync_data().map_err(|error| self.failed(&error))
     }
 
     fn failed(&self, error: &std::io::Error) -> Failure {
+        if is_stdout(&self.path) {
+            return Failure::of_writing("the results", &self.path, error);
+        }
         Failure::of_writing("the results", &self.path, error)
             .next("what is in the file is kept: the same command with --resume goes on")
     }
@@ -111,15 +125,20 @@ fn go_through(file: &File, sweep: &Sweep, summary: &mut Summary) -> Result<(u64,
     Ok((reader.runs(), reader.bytes()))
 }
 
-/// A file that becomes NAME when it is whole: until then it is NAME.part, which a merge that is killed leaves.
+/// A file that becomes NAME when it is whole: until then it is NAME.part, which a merge that is killed leaves. Standard output has
+/// no such part.
 struct Whole<'a> {
     path: &'a Path,
-    part: PathBuf,
+    part: Option<PathBuf>,
     file: BufWriter<File>,
 }
 
 impl<'a> Whole<'a> {
     fn begin(path: &'a Path) -> Result<Self, Failure> {
+        if is_stdout(path) {
+            let file = stdout_file().map_err(|error| Failure::of_writing("the results", path, &error))?;
+            return Ok(Self { path, part: None, file: BufWriter::new(file) });
+        }
         if path.symlink_metadata().is_ok() {
             return Err(already_exists(path, "remove it, or give another --output"));
         }
@@ -127,16 +146,21 @@ impl<'a> Whole<'a> {
         part.push(".part");
         let part = PathBuf::from(part);
         let file = create(&part, "another merge writes it; or one was ended before it was whole, then remove it")?;
-        Ok(Self { path, part, file: BufWriter::new(file) })
+        Ok(Self { path, part: Some(part), file: BufWriter::new(file) })
     }
 
     fn write(&mut self, line: &str) -> Result<(), Failure> {
-        self.file.write_all(line.as_bytes()).map_err(|error| Failure::of_writing("the results", &self.part, &error))
+        let place = self.part.as_deref().unwrap_or(self.path);
+        self.file.write_all(line.as_bytes()).map_err(|error| Failure::of_writing("the results", place, &error))
     }
 
     /// Gives it its name, if all of it was `taken`; else it is removed.
     fn end(self, taken: Result<(), Failure>) -> Result<(), Failure> {
         let Self { path, part, mut file } = self;
+        let Some(part) = part else {
+            let written = file.flush().map_err(|error| Failure::of_writing("the results", path, &error));
+            return taken.and(written);
+        };
         let on_disk = |file: &mut BufWriter<File>| file.flush().and_then(|()| file.get_ref().sync_all());
         let written = taken.and_then(|()| {
             let named = on_disk(&mut file).and_then(|()| std::fs::rename(&part, path));

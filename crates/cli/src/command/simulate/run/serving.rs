@@ -14,6 +14,7 @@ use transport::{Hub, HubOptions, ServeSpec, WallClock, run_world};
 
 use super::loaded::unbuildable;
 use crate::failure::Failure;
+use crate::output::ready_line;
 use crate::recording::RecordOptions;
 use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
 use crate::session::not_served;
@@ -64,7 +65,7 @@ impl ServeOptions {
         seed: Option<u64>,
         threads: usize,
         recording: &RecordOptions,
-        file: &Path,
+        (file, json): (&Path, bool),
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         let (mut world, execution) = Execution::begin(scenario, seed).map_err(|bad| unbuildable(file, bad))?;
         world.set_threads(threads);
@@ -78,7 +79,7 @@ impl ServeOptions {
         let (waiting, by_hand) = (VecDeque::new(), self.clock == ClockArg::Manual);
         let is_typed = is_typed();
         let service = Service { answers, warnings, log: None, record, waiting, quit_in: None, by_hand, is_typed };
-        runtime_of_clients()?.block_on(self.serve(world, execution, service))
+        runtime_of_clients()?.block_on(self.serve(world, execution, service, json))
     }
 
     async fn serve(
@@ -86,6 +87,7 @@ impl ServeOptions {
         mut world: ServedWorld,
         execution: Execution,
         mut service: Service,
+        json: bool,
     ) -> Result<(Outcome, Result<(), Failure>), Failure> {
         let clock = WallClock::start();
         let (requests, mut incoming) = mpsc::channel(REQUESTS_WAITING);
@@ -97,9 +99,9 @@ impl ServeOptions {
         world.on_run_over(move || run_is_over.try_send(Asked::RunIsOver).is_ok());
         world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
         world.follow(execution, move || scenario_is_over.try_send(Asked::ScenarioIsOver).is_ok());
-        let listeners = hub.listeners().iter().map(|listener| format!(" {listener}"));
-        let place = control.iter().map(|server| format!(" {}", server.place()));
-        service.answers.say(&["ready".to_owned()].into_iter().chain(listeners).chain(place).collect::<String>());
+        let places = hub.listeners().iter().map(ToString::to_string);
+        let places: Vec<_> = places.chain(control.iter().map(|server| server.place().to_string())).collect();
+        service.answers.say(&ready_line(json, &places));
         tokio::spawn(tick(requests.clone(), clock.clone()));
         let serving =
             run_world(&mut world, &mut hub, &clock, &mut incoming, |world, request| service.serve(world, request));

@@ -11,7 +11,7 @@ use words::document::BadFile;
 use super::crew::Crew;
 use super::results::{ResultsFile, merge_files};
 use crate::failure::Failure;
-use crate::output::{Format, Report};
+use crate::output::{Format, Report, is_stdout, print_error};
 use crate::progress::Progress;
 use plot::Paint;
 use plot::Table;
@@ -41,7 +41,7 @@ pub(super) fn sweep(sweep: &Sweep, asked: &Asked<'_>, file: &Path, format: Forma
     let mut summary = Summary::default();
     if !asked.merge.is_empty() {
         merge_files(asked.merge, asked.output, sweep, &mut summary, &asked.again)?;
-        return print(sweep, &summary, file, format, None);
+        return print(sweep, &summary, asked, file, format, None);
     }
     let mut results = None;
     let mut done = 0;
@@ -52,7 +52,7 @@ pub(super) fn sweep(sweep: &Sweep, asked: &Asked<'_>, file: &Path, format: Forma
     }
     let crew = Crew::new(asked.jobs);
     make_runs(sweep, done, &crew, &mut summary, results.as_mut(), &Progress::new(format.json))?;
-    print(sweep, &summary, file, format, crew.signal().map(crate::failure::ended_by))
+    print(sweep, &summary, asked, file, format, crew.signal().map(crate::failure::ended_by))
 }
 
 /// Makes the runs of this part from the `done`-th on.
@@ -93,11 +93,22 @@ fn make_runs(
     results.map_or(Ok(()), ResultsFile::finish)
 }
 
-/// Prints the summary, and fails with `ended` or with the runs that failed.
-fn print(sweep: &Sweep, summary: &Summary, file: &Path, format: Format, ended: Option<Failure>) -> Result<(), Failure> {
+/// Prints the summary, beside results on standard output as a note, and fails with `ended` or with the runs that failed.
+fn print(
+    sweep: &Sweep,
+    summary: &Summary,
+    asked: &Asked<'_>,
+    file: &Path,
+    format: Format,
+    ended: Option<Failure>,
+) -> Result<(), Failure> {
     let mut report = SweepReport::new(file, sweep, summary);
     let failure = ended.or_else(|| failure(&report));
     report.ok = failure.is_none();
+    if asked.output.is_some_and(is_stdout) {
+        print_error(&report.text(Paint::OFF));
+        return format.ended(failure);
+    }
     format.print_judged(&report, failure)
 }
 

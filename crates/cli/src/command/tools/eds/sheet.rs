@@ -108,7 +108,7 @@ impl SheetArgs {
     }
 }
 
-/// Values that the device would refuse are none to be delivered with.
+/// Refuses defaults that the device would refuse.
 fn check(model: &Description, presets: &[Preset]) -> Result<(), Failure> {
     for Preset { object, value } in presets {
         let refused = model.row(*object).and_then(|row| row.check_value(*value).err());

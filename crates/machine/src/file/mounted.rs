@@ -1,4 +1,4 @@
-//! Where an encoder sits: `shaft` of a drive's table.
+//! What an encoder is mounted on: `shaft` of a drive's table.
 
 use canopen::NodeId;
 use sim::{Place, World};
@@ -10,12 +10,12 @@ const SHAFT: &str = "the node whose shaft it sits on, e.g. 4, or \"5.2\" for an 
 
 /// The shaft of another node.
 #[derive(Clone, Debug)]
-pub(super) struct Seat {
+pub(super) struct MountedOn {
     shaft: Place,
     at: Located,
 }
 
-impl Seat {
+impl MountedOn {
     /// What a drive's table has of it.
     pub(super) fn parse(table: &Table<'_>) -> Result<Option<Self>, Problem> {
         let Some(field) = table.get("shaft") else { return Ok(None) };
