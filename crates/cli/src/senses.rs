@@ -160,7 +160,7 @@ const LOOKING: &[Row] = &[
     },
     Row { words: &["export dcf"], tips: &["dcf 4 -o drive.dcf"] },
     Row { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], tips: &["studio"] },
-    Row { words: &["measure", "measurement"], tips: &["capture 4 velocity current -o run.mcap", "top"] },
+    Row { words: &["measure", "measurement"], tips: &["capture 4 606C 6077 -o run.mcap", "top"] },
     Row {
         words: &["server"],
         tips: &["studio", "sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536", "gateway"],

@@ -82,7 +82,7 @@ fn what_other_tools_call_it_is_answered_by_its_sense() {
         ("isotpdump", "dump"),
         ("power", "state 4"),
         ("shutdown", "disable 4"),
-        ("measure", "capture 4 velocity current -o run.mcap"),
+        ("measure", "capture 4 606C 6077 -o run.mcap"),
         ("ros2", "check bus.yml"),
         ("watchdog", "scan"),
         ("halt", "estop"),

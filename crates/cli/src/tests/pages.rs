@@ -71,8 +71,8 @@ fn every_command_of_every_page_is_one_that_the_parser_takes() {
             for line in blocks.flat_map(str::lines).filter_map(|line| line.strip_prefix("ferrodrive ")) {
                 let line = line.split(" #").next().unwrap_or_default();
                 // What a shell makes of it: a pipe, an ampersand and files that a data sheet is read from are not there.
-                let line = line.split(['|', '&', '>']).next().unwrap_or_default();
-                let words = quoted(line);
+                let is_of_shell = |word: &String| ["|", "&", ">", ">>"].contains(&word.as_str());
+                let words: Vec<_> = quoted(line).into_iter().take_while(|word| !is_of_shell(word)).collect();
                 if words.iter().any(|word| word.ends_with(".eds") || word.contains(".eds@") || word == "..") {
                     continue;
                 }

@@ -86,7 +86,6 @@ const NOT_DONE: &[(&str, &str)] = &[
     ("world --control 127.0.0.1:1 now", "control"),
     ("run FOLDER/a.log", "bad_file"),
     ("export dbc 9", "no_answer"),
-    ("man-pages FOLDER/a.log", "file"),
     ("replay FOLDER/moves.log", "motion"),
     ("studio --listen 192.0.2.1:1", "failed"),
     ("studio --listen 127.0.0.1:0 --password-file FOLDER/empty.bin", "bad_file"),
@@ -153,6 +152,8 @@ fn every_wrong_input_has_a_kind_and_a_remedy() {
     for (line, kind) in NOT_DONE {
         assert_eq!(has_a_remedy(1, &words(line).split(' ').collect::<Vec<_>>()), *kind, "{line}");
     }
+    // It prints nothing, and so nothing as JSON.
+    assert_eq!(ferrodrive(&["man-pages", folder.join("a.log").to_str().unwrap()]).status, Some(1));
     for line in NO_SENSE {
         has_a_remedy(2, &words(line).split(' ').collect::<Vec<_>>());
     }

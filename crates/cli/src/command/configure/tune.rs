@@ -109,7 +109,7 @@ pub(crate) struct Tune {
     /// Write the proposed values to the drive, and measure once more
     #[arg(long)]
     apply: bool,
-    /// Draw frequency response and trials to this file (-: standard output)
+    /// Draw response and trials to this file (-: standard output)
     #[arg(long, short, alias = "picture", value_name = "FILE.svg", value_parser = svg_path)]
     output: Option<PathBuf>,
     /// Longest time for the transaction
