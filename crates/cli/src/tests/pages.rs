@@ -57,44 +57,6 @@ fn follow(page: &str) -> usize {
     commands.len()
 }
 
-/// The lines of every page, also of one whose commands are not run: each is a command line, with the options that its command has.
-#[test]
-fn every_command_of_every_page_is_one_that_the_parser_takes() {
-    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-    let mut parser = command_line();
-    let mut taken = 0;
-    for folder in [docs.clone(), docs.join("handbook"), docs.join("..")] {
-        let entries = std::fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path());
-        for path in entries.filter(|path| path.extension().is_some_and(|ending| ending == "md")) {
-            let text = std::fs::read_to_string(&path).expect("UTF-8");
-            let blocks = text.split("\n```").skip(1).step_by(2);
-            for line in blocks.flat_map(str::lines).filter_map(|line| line.strip_prefix("ferrodrive ")) {
-                let line = line.split(" #").next().unwrap_or_default();
-                // What a shell makes of it: a pipe, an ampersand and files that a data sheet is read from are not there.
-                let is_of_shell = |word: &String| ["|", "&", ">", ">>"].contains(&word.as_str());
-                let words: Vec<_> = quoted(line).into_iter().take_while(|word| !is_of_shell(word)).collect();
-                if words.iter().any(|word| word.ends_with(".eds") || word.contains(".eds@") || word == "..") {
-                    continue;
-                }
-                let parsed = parser.try_get_matches_from_mut(["ferrodrive".to_owned()].into_iter().chain(words));
-                let is_help = parsed.as_ref().is_err_and(|error| !error.use_stderr());
-                assert!(parsed.is_ok() || is_help, "{}: {line}: {}", path.display(), parsed.unwrap_err());
-                taken += 1;
-            }
-        }
-    }
-    assert!(taken > 150, "{taken}");
-}
-
-/// The words of a line, of which some may stand in quotation marks.
-fn quoted(line: &str) -> Vec<String> {
-    let parts = line.split('\'').enumerate();
-    parts
-        .flat_map(|(n, part)| if n % 2 == 1 { vec![part] } else { part.split_whitespace().collect() })
-        .map(str::to_owned)
-        .collect()
-}
-
 #[test]
 fn every_command_of_the_page_on_lss_ends_well() {
     assert_eq!(follow("lss.md"), 7);

@@ -11,7 +11,7 @@ const PRINTED_PORT: &str = "29536";
 /// Lines that are not our commands: checked elsewhere, or of another program.
 const OTHERS: &[&str] = &["cargo ", "git ", "pip ", "#"];
 
-/// A bus that is not there: what is typed on it is parsed by `crates/cli/src/tests/pages.rs`.
+/// A bus that is not there.
 const REAL_BUS: &str = "--bus can0";
 
 fn root() -> PathBuf {
