@@ -374,7 +374,7 @@ fn a_tuning_and_a_test_motion_are_in_the_report_of_their_node() {
     for part in ["Tuning", "rise, 0 to 60 r/min", "r.m.s.", "speed_proportional_gain_kp", &gain["after"].to_string()] {
         assert!(page.contains(part), "{part}");
     }
-    // That of another node, and what is none.
+    // That of another node, and what is not one.
     for (node, path, why) in [("5", &tune, "it is of node 4 (zlac8030l)"), ("4", &step, "it is not JSON")] {
         let refused = ferrodrive(&["report", node, "--tune", path, "-o", &place.path("other.html")]);
         assert!(refused.status == Some(1) && refused.err.contains(why), "{}", refused.err);
