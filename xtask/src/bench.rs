@@ -11,7 +11,7 @@ use crate::times::ticks_of_children;
 use crate::{process, workspace};
 
 /// What counts: an example of the benches, what it is asked for, and two lengths whose difference is so many of the unit.
-struct Row {
+struct BenchRow {
     name: String,
     example: &'static str,
     arguments: Vec<String>,
@@ -73,8 +73,8 @@ fn measure(commit: Option<&str>, wanted: &[&str]) -> Result<bool, String> {
     process::output(Command::new("valgrind").arg("--version"))
         .map_err(|error| format!("{error}\ncallgrind counts the instructions: install valgrind"))?;
     let builds = Builds::make(commit)?;
-    let rows: Vec<Row> = frames().chain(worlds(&builds.now)?).chain([cycle()]).collect();
-    let rows: Vec<&Row> =
+    let rows: Vec<BenchRow> = frames().chain(worlds(&builds.now)?).chain([cycle()]).collect();
+    let rows: Vec<&BenchRow> =
         rows.iter().filter(|row| wanted.is_empty() || wanted.iter().any(|word| row.name.contains(word))).collect();
     if rows.is_empty() {
         return Err(format!("no row has {} in its name", wanted.join(" or ")));
@@ -86,7 +86,7 @@ fn measure(commit: Option<&str>, wanted: &[&str]) -> Result<bool, String> {
     }
 }
 
-fn count(builds: &Builds, rows: &[&Row]) -> Result<(), String> {
+fn count(builds: &Builds, rows: &[&BenchRow]) -> Result<(), String> {
     let before = builds.before.as_ref().map(|(commit, _)| commit.as_str());
     println!("Instructions (a frame, a control period of 50 us, a cycle of six drives):\n");
     match before {
@@ -107,7 +107,7 @@ fn count(builds: &Builds, rows: &[&Row]) -> Result<(), String> {
     Ok(())
 }
 
-fn time(commit: &str, now: &Path, before: &Path, rows: &[&Row]) -> Result<bool, String> {
+fn time(commit: &str, now: &Path, before: &Path, rows: &[&BenchRow]) -> Result<bool, String> {
     println!("\nProcessor time now / {commit}, {PAIRS} pairs of runs in turn:\n");
     println!("| | median | least | most | digest |\n|---|---|---|---|---|");
     let mut same = true;
@@ -164,12 +164,12 @@ fn build(tree: &Path, target: &Path) -> Result<PathBuf, String> {
 }
 
 /// What a run took, and the last line that it said.
-struct Run {
+struct RunCost {
     ticks: f64,
     said: String,
 }
 
-impl Row {
+impl BenchRow {
     /// How many drives its world has.
     fn drives(&self) -> u32 {
         self.name.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or(3)
@@ -181,11 +181,11 @@ impl Row {
         program.into_iter().chain(self.arguments.clone()).chain([length.to_string()]).collect()
     }
 
-    fn run(&self, folder: &Path, length: u32) -> Result<Run, String> {
+    fn run(&self, folder: &Path, length: u32) -> Result<RunCost, String> {
         let words = self.program(folder, length);
         let before = ticks_of_children()?;
         let said = process::output(Command::new(&words[0]).args(&words[1..]))?;
-        Ok(Run { ticks: ticks_of_children()? - before, said: said.lines().last().unwrap_or_default().to_owned() })
+        Ok(RunCost { ticks: ticks_of_children()? - before, said: said.lines().last().unwrap_or_default().to_owned() })
     }
 
     /// Instructions of one unit.
@@ -208,8 +208,8 @@ fn collected(said: &str) -> Option<f64> {
     said.rsplit("Collected :").next().filter(|rest| rest.len() < said.len())?.split_whitespace().next()?.parse().ok()
 }
 
-fn frames() -> impl Iterator<Item = Row> {
-    let row = |name: String, subject: &str, number: usize| Row {
+fn frames() -> impl Iterator<Item = BenchRow> {
+    let row = |name: String, subject: &str, number: usize| BenchRow {
         name,
         example: "count_instructions",
         arguments: vec![subject.to_owned(), number.to_string()],
@@ -224,10 +224,10 @@ fn frames() -> impl Iterator<Item = Row> {
 }
 
 /// The worlds that the example lists: their number and name.
-fn worlds(folder: &Path) -> Result<Vec<Row>, String> {
+fn worlds(folder: &Path) -> Result<Vec<BenchRow>, String> {
     let example = folder.join(format!("run_world{}", std::env::consts::EXE_SUFFIX));
     let list = process::output(&mut Command::new(example))?;
-    let row = |(number, name): (&str, &str)| Row {
+    let row = |(number, name): (&str, &str)| BenchRow {
         name: name.to_owned(),
         example: "run_world",
         arguments: vec![number.to_owned()],
@@ -238,8 +238,8 @@ fn worlds(folder: &Path) -> Result<Vec<Row>, String> {
     Ok(list.lines().filter_map(|line| line.split_once(' ')).map(row).collect())
 }
 
-fn cycle() -> Row {
-    Row {
+fn cycle() -> BenchRow {
+    BenchRow {
         name: "a cycle of six drives in the master".to_owned(),
         example: "count_cycle",
         arguments: Vec::new(),
@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_world_has_as_many_drives_as_its_name_says() {
-        let named = |name: &str| Row { name: name.to_owned(), ..cycle() }.drives();
+        let named = |name: &str| BenchRow { name: name.to_owned(), ..cycle() }.drives();
         assert_eq!([named("127 hub servos turning, silent bus"), named("one of each turning, silent bus")], [127, 3]);
     }
 }

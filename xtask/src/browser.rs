@@ -27,8 +27,7 @@ pub(crate) fn step() -> Tally {
     }
     // One browser at a time: each takes some hundred megabytes and a core.
     let how = How { programs: 1, threads: 1, arguments: &arguments };
-    let run = |programs| test_programs::run(programs, how);
-    let tally = test_programs::build(SCHEMA_AND_BROWSER).map_or_else(Tally::failed, run);
+    let tally = test_programs::build_and_run(SCHEMA_AND_BROWSER, how);
     match without_axe {
         Some(reason) if tally.failed == 0 => {
             Tally { skipped: tally.skipped + 1, note: format!("{AXE}: {reason}"), ..tally }

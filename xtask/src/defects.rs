@@ -20,7 +20,7 @@ use list::defects;
 
 /// What became of a defect.
 #[derive(Debug, PartialEq, Eq)]
-enum Verdict {
+enum TrialResult {
     /// These tests failed.
     Noticed(Vec<String>),
     /// They did not end.
@@ -68,11 +68,11 @@ fn check(numbers: &[usize]) -> Result<bool, String> {
     let (list, mut missed) = (defects(), 0);
     for number in numbers {
         let defect = list[number - 1];
-        if sound.insert(defect.noticed_by) && run(&copy, defect.noticed_by)? != Verdict::Missed {
+        if sound.insert(defect.noticed_by) && run(&copy, defect.noticed_by)? != TrialResult::Missed {
             return Err(format!("{:?} fails without a defect", defect.noticed_by));
         }
         let verdict = with(&copy, defect, || run(&copy, defect.noticed_by))?;
-        missed += usize::from(verdict == Verdict::Missed);
+        missed += usize::from(verdict == TrialResult::Missed);
         let Tests { package, target, .. } = defect.noticed_by;
         println!("{number:3}  {}: {} | {package} {target}: {verdict}", defect.file, defect.instead.trim());
     }
@@ -121,7 +121,7 @@ impl Defect {
     }
 }
 
-fn run(copy: &Path, tests: Tests) -> Result<Verdict, String> {
+fn run(copy: &Path, tests: Tests) -> Result<TrialResult, String> {
     let mut words = vec!["-p", tests.package];
     words.extend(if tests.target == "--lib" { vec!["--lib"] } else { vec!["--test", tests.target] });
     let mut cargo = workspace::cargo();
@@ -133,7 +133,7 @@ fn run(copy: &Path, tests: Tests) -> Result<Verdict, String> {
 }
 
 /// What a program of tests says; `said` is a file for its output.
-fn judge(program: &Program, filter: &str, said: &Path) -> Result<Verdict, String> {
+fn judge(program: &Program, filter: &str, said: &Path) -> Result<TrialResult, String> {
     let failed = |error: std::io::Error| format!("{}: {error}", program.path.display());
     let file = fs::File::create(said).map_err(failed)?;
     let mut command = program.command();
@@ -146,22 +146,26 @@ fn judge(program: &Program, filter: &str, said: &Path) -> Result<Verdict, String
         }
         if begin.elapsed() > LONGEST {
             child.kill().and_then(|()| child.wait()).map_err(failed)?;
-            return Ok(Verdict::Hung);
+            return Ok(TrialResult::Hung);
         }
         std::thread::sleep(Duration::from_millis(20));
     };
     let text = fs::read_to_string(said).map_err(failed)?;
     if !text.contains("test result: ") || text.contains("running 0 tests") {
-        return if ended_well { Err(format!("{}: no test ran", program.path.display())) } else { Ok(Verdict::Hung) };
+        return if ended_well {
+            Err(format!("{}: no test ran", program.path.display()))
+        } else {
+            Ok(TrialResult::Hung)
+        };
     }
     Ok(if ended_well {
-        Verdict::Missed
+        TrialResult::Missed
     } else {
-        Verdict::Noticed(text.lines().filter_map(libtest::failed_test).collect())
+        TrialResult::Noticed(text.lines().filter_map(libtest::failed_test).collect())
     })
 }
 
-impl std::fmt::Display for Verdict {
+impl std::fmt::Display for TrialResult {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Noticed(tests) => {

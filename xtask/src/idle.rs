@@ -1,12 +1,13 @@
-//! `cargo xtask idle [SECONDS]`: the cost of an idle simulator. One drive of each kind, and six, on a served bus that no client
-//! uses; the processor time that each takes, in per cent of a core, from `/proc/PID/stat`.
+//! `cargo xtask idle [SECONDS]`: what a simulator takes that waits. One drive of each kind, and six, on a served bus that no client
+//! uses; then three joints that a client has interpolate, with SYNC each 2 ms. The processor time of the simulator alone, in per
+//! cent of a core, from `/proc/PID/stat`.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{process, program};
+use crate::{process, program, workspace};
 
 /// Default time for which each is watched.
 const SECONDS: u64 = 60;
@@ -22,6 +23,12 @@ const BUSES: [(&str, &[&str]); 5] = [
     ("a cia402", &["cia402@1"]),
     ("six", &["zlac8030l@1", "zlac8030l@2", "m4230e17b50@3", "m4230e17b50@4", "zlim42c@5", "zlim42c@6"]),
 ];
+
+/// What interpolates: joints, whose time base is 2 ms.
+const JOINTS: [&str; 3] = ["m4230e17b50@1", "m4230e17b50@2", "m4230e17b50@3"];
+
+/// The points of their path: a turn of the motor forth and back in two seconds, a tenth of a second apart.
+const POINTS_A_SECOND: u64 = 10;
 
 /// Runs `cargo xtask idle`.
 pub(crate) fn command(arguments: &[&str]) -> ExitCode {
@@ -48,27 +55,59 @@ fn measure(seconds: u64) -> Result<(), String> {
         return Err("processor time is read from /proc, which Linux has".into());
     }
     let program = program::of_dist()?;
+    let time = Duration::from_secs(seconds);
     // Ticks of /proc: what `getconf` says.
     let ticks = process::output(Command::new("getconf").arg("CLK_TCK"))?;
     let per_s: f64 = ticks.trim().parse().map_err(|_| format!("getconf CLK_TCK says {ticks:?}"))?;
     println!("{seconds} s each, in per cent of a core");
     for (name, drives) in BUSES {
-        let simulator = Simulator::start(&program, drives)?;
-        std::thread::sleep(SETTLING);
-        let (began, before) = (Instant::now(), simulator.ticks()?);
-        std::thread::sleep(Duration::from_secs(seconds));
-        let used_s = (simulator.ticks()? - before) / per_s;
-        println!("{name:12} {:6.2}", 100.0 * used_s / began.elapsed().as_secs_f64());
+        let (simulator, _) = Simulator::start(&program, drives)?;
+        println!("{name:25} {:6.2}", simulator.watch(time)? / per_s);
     }
-    Ok(())
+    let (simulator, bus) = Simulator::start(&program, &JOINTS)?;
+    let mut client = interpolate(&program, &bus, seconds)?;
+    let used = simulator.watch(time);
+    // It ends with its path, a few seconds after the watch: that it still led the joints at the end of the watch shows in how it ends.
+    let led = client.wait().map_err(|error| format!("ferrodrive group follow: {error}"))?;
+    println!("{:25} {:6.2}", "three joints, 2 ms", used? / per_s);
+    if led.success() { Ok(()) } else { Err("ferrodrive group follow has failed: read the lines above".into()) }
+}
+
+/// Starts a client that leads the joints along a path for longer than they are watched.
+fn interpolate(program: &Path, bus: &str, seconds: u64) -> Result<Child, String> {
+    let folder = workspace::target().join("idle");
+    let (machine, path) = (folder.join("joints.toml"), folder.join("path.csv"));
+    let mut of_machine = String::new();
+    let mut of_group = "[[group]]\nname = \"arm\"\nperiod = \"2ms\"\n".to_owned();
+    for node in 1..=JOINTS.len() {
+        of_machine += &format!("[[drive]]\nmodel = \"m4230e17b50\"\nnode = {node}\n\n");
+        of_group += &format!(
+            "\n[[group.axis]]\nnode = {node}\nmode = \"ip\"\nvelocity_deg_s = 1000\nacceleration_deg_s2 = 3000\n"
+        );
+        of_group += "jerk_deg_s3 = 30000\nfollowing_error_deg = 60\n";
+    }
+    let mut points = "t_s,1.angle_deg,2.angle_deg,3.angle_deg\n".to_owned();
+    for point in 0..=(seconds + 4 * SETTLING.as_secs()) * POINTS_A_SECOND {
+        let time_s = point as f64 / POINTS_A_SECOND as f64;
+        let angle = 180.0 * (1.0 - (std::f64::consts::PI * time_s).cos());
+        points += &format!("{time_s},{angle:.3},{angle:.3},{angle:.3}\n");
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    for (file, text) in [(&machine, of_machine + &of_group), (&path, points)] {
+        std::fs::write(file, text).map_err(|error| format!("{}: {error}", file.display()))?;
+    }
+    let mut command = Command::new(program);
+    command.args(["--bus", bus, "group", "follow", "--relative"]).args([machine, path]);
+    let client = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn();
+    client.map_err(|error| format!("cannot run ferrodrive: {error}"))
 }
 
 /// A simulator that serves its bus, ended when it is dropped.
 struct Simulator(Child);
 
 impl Simulator {
-    /// Starts it and waits until it is ready.
-    fn start(program: &Path, drives: &[&str]) -> Result<Self, String> {
+    /// Starts it and waits until it is ready; also returns the address of its bus.
+    fn start(program: &Path, drives: &[&str]) -> Result<(Self, String), String> {
         let mut command = Command::new(program);
         command.args(["sim", "--serve", "socketcand://127.0.0.1:0"]);
         drives.iter().for_each(|drive| _ = command.args(["--drive", drive]));
@@ -79,7 +118,17 @@ impl Simulator {
         let simulator = Self(child);
         let mut line = String::new();
         BufReader::new(output).read_line(&mut line).map_err(|error| format!("ferrodrive sim: {error}"))?;
-        if line.is_empty() { Err("ferrodrive sim has not started".into()) } else { Ok(simulator) }
+        let bus =
+            line.trim().strip_prefix("ready ").ok_or_else(|| format!("ferrodrive sim has not started: {line:?}"))?;
+        Ok((simulator, bus.to_owned()))
+    }
+
+    /// Lets it settle, then watches it for so long: a hundred times the ticks that it takes a second.
+    fn watch(&self, time: Duration) -> Result<f64, String> {
+        std::thread::sleep(SETTLING);
+        let (began, before) = (Instant::now(), self.ticks()?);
+        std::thread::sleep(time);
+        Ok(100.0 * (self.ticks()? - before) / began.elapsed().as_secs_f64())
     }
 
     /// Processor time so far, of user and kernel, in ticks.

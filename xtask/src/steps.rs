@@ -180,8 +180,7 @@ fn tests() -> Tally {
 
 /// The tests that `cargo test` selects by these words, in virtual time. The programs get further arguments, such as a filter.
 pub(crate) fn tests_of(words: &[&str], arguments: &[&str]) -> Tally {
-    let how = How { arguments, ..COMPUTING };
-    test_programs::build(words).map_or_else(Tally::failed, |programs| test_programs::run(programs, how))
+    test_programs::build_and_run(words, How { arguments, ..COMPUTING })
 }
 
 fn real_time() -> Tally {
@@ -189,12 +188,11 @@ fn real_time() -> Tally {
     if let Err(error) = program::built() {
         return Tally::failed(error);
     }
-    test_programs::build(REAL_TIME).map_or_else(Tally::failed, |programs| test_programs::run(programs, WAITING))
+    test_programs::build_and_run(REAL_TIME, WAITING)
 }
 
 fn schema() -> Tally {
-    test_programs::build(SCHEMA_AND_BROWSER)
-        .map_or_else(Tally::failed, |programs| test_programs::run(programs, WAITING))
+    test_programs::build_and_run(SCHEMA_AND_BROWSER, WAITING)
 }
 
 fn doctests() -> Tally {

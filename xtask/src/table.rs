@@ -6,10 +6,10 @@ use std::time::Duration;
 use crate::tally::Tally;
 
 /// A step that has run: its name, how long it took, what it found.
-pub(crate) type Row = (&'static str, Duration, Tally);
+pub(crate) type StepRow = (&'static str, Duration, Tally);
 
 /// Prints the table; success if nothing failed.
-pub(crate) fn conclude(rows: &[Row], took: Duration) -> ExitCode {
+pub(crate) fn conclude(rows: &[StepRow], took: Duration) -> ExitCode {
     println!("\n{:10} {:8} {:>8} {:>7} {:>7} {:>8}  note", "step", "result", "time", "passed", "failed", "skipped");
     for (name, took, tally) in rows {
         let Tally { passed, failed, skipped, note } = tally;
@@ -20,7 +20,7 @@ pub(crate) fn conclude(rows: &[Row], took: Duration) -> ExitCode {
 }
 
 /// What all steps found together.
-pub(crate) fn sum(rows: &[Row]) -> Tally {
+pub(crate) fn sum(rows: &[StepRow]) -> Tally {
     let mut sum = Tally::default();
     rows.iter().for_each(|(_, _, tally)| sum.add(tally));
     sum

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::since;
 use crate::steps::{FETCHES, STEPS, Step, When};
-use crate::table::{Row, conclude, seconds, sum};
+use crate::table::{StepRow, conclude, seconds, sum};
 use crate::{libtest, say};
 
 /// How many steps that wait run side by side, beside those that compute.
@@ -110,12 +110,12 @@ fn fetch_for(steps: &[&'static Step]) {
     }
 }
 
-fn ran(rows: &[Row], name: &str) -> bool {
+fn ran(rows: &[StepRow], name: &str) -> bool {
     rows.iter().any(|(ran, ..)| *ran == name)
 }
 
 /// Runs a step; `beside` others, each of its lines begins with its name.
-fn run_one(step: &'static Step, beside: bool, rows: &Mutex<Vec<Row>>) {
+fn run_one(step: &'static Step, beside: bool, rows: &Mutex<Vec<StepRow>>) {
     println!("[{}] {}", step.name, step.does);
     say::work_for(beside.then_some(step.name));
     let start = Instant::now();

@@ -6,11 +6,13 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
+use std::time::Instant;
 
 use serde_json::Value;
 
 use crate::libtest::{self, Timed};
 use crate::say;
+use crate::table::seconds;
 use crate::tally::Tally;
 use crate::{process, workspace};
 
@@ -79,6 +81,19 @@ fn program_of(message: Value) -> Option<Program> {
     let folder = Path::new(message["manifest_path"].as_str()?).parent()?.to_path_buf();
     let path = message["executable"].as_str().map(PathBuf::from)?;
     (message["profile"]["test"] == true).then_some(Program { path, folder })
+}
+
+/// Builds tests and runs them; shows how long each of the two took.
+pub(crate) fn build_and_run(words: &[&str], how: How<'_>) -> Tally {
+    let start = Instant::now();
+    let programs = match build(words) {
+        Ok(programs) => programs,
+        Err(error) => return Tally::failed(error),
+    };
+    let built = start.elapsed();
+    let tally = run(programs, how);
+    say::say(format_args!("built in {}, ran in {}", seconds(built), seconds(start.elapsed() - built)));
+    tally
 }
 
 /// Runs them all, whatever fails; shows what failed, and the slowest tests if that is asked for.

@@ -11,34 +11,34 @@ use std::time::Instant;
 use crate::{process, python, workspace};
 
 /// A row: its name, whether it begins with an empty target folder, and what is run.
-struct Row {
+struct TimedCommand {
     name: &'static str,
     what: &'static str,
     anew: bool,
     command: fn(&Path) -> Result<Command, String>,
 }
 
-const ROWS: &[Row] = &[
-    Row { name: "demo", what: "`cargo demo`", anew: true, command: |clone| Ok(cargo(clone, &["demo"])) },
-    Row {
+const ROWS: &[TimedCommand] = &[
+    TimedCommand { name: "demo", what: "`cargo demo`", anew: true, command: |clone| Ok(cargo(clone, &["demo"])) },
+    TimedCommand {
         name: "quick",
         what: "`cargo xtask test`, the quick list",
         anew: true,
         command: |clone| Ok(cargo(clone, &["xtask", "test"])),
     },
-    Row {
+    TimedCommand {
         name: "change",
         what: "after a change in a drive: `cargo xtask test --quick-since HEAD`",
         anew: false,
         command: changed,
     },
-    Row {
+    TimedCommand {
         name: "all",
         what: "`cargo xtask test --all`",
         anew: true,
         command: |clone| Ok(cargo(clone, &["xtask", "test", "--all"])),
     },
-    Row { name: "pip", what: "`pip install .` in the clone", anew: true, command: pip },
+    TimedCommand { name: "pip", what: "`pip install .` in the clone", anew: true, command: pip },
 ];
 
 /// The file in which a developer changes something.
@@ -59,7 +59,7 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
     }
 }
 
-fn measure(wanted: impl Fn(&Row) -> bool) -> Result<(), String> {
+fn measure(wanted: impl Fn(&TimedCommand) -> bool) -> Result<(), String> {
     let place = workspace::target().join("times");
     let _ = fs::remove_dir_all(&place);
     fs::create_dir_all(&place).map_err(|error| format!("{}: {error}", place.display()))?;

@@ -5,7 +5,7 @@
 //! their bytes from the end on, and alike ones stand next to each other.
 
 /// A section: its kind, and its content (WebAssembly core specification, 5.5.2).
-type Section<'a> = (u8, &'a [u8]);
+type WasmSection<'a> = (u8, &'a [u8]);
 
 const CUSTOM: u8 = 0;
 const IMPORTS: u8 = 2;
@@ -68,7 +68,7 @@ pub(crate) fn ordered(module: &[u8]) -> Result<Vec<u8>, String> {
     Ok(made)
 }
 
-fn sections(module: &[u8]) -> Result<Vec<Section<'_>>, String> {
+fn sections(module: &[u8]) -> Result<Vec<WasmSection<'_>>, String> {
     let mut rest = Reader(module.strip_prefix(HEAD).ok_or("it is not a module of version 1")?);
     let mut sections = Vec::new();
     while !rest.0.is_empty() {
@@ -129,7 +129,7 @@ impl<'a> Body<'a> {
         }
         let (mut parts, mut end) = (Vec::new(), code);
         while !from.0.is_empty() {
-            if let Some(Named { function, length }) = from.instruction()?.1 {
+            if let Some(FunctionIndex { function, length }) = from.instruction()?.1 {
                 let before = end.len() - from.0.len() - length;
                 parts.push((&end[..before], function));
                 end = from.0;
@@ -156,7 +156,7 @@ impl<'a> Body<'a> {
 }
 
 /// A function that an instruction names, and how many bytes its number takes.
-struct Named {
+struct FunctionIndex {
     function: u32,
     length: usize,
 }
@@ -202,7 +202,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads an instruction; returns its opcode, and the function that it names (5.4).
-    fn instruction(&mut self) -> Result<(u8, Option<Named>), String> {
+    fn instruction(&mut self) -> Result<(u8, Option<FunctionIndex>), String> {
         let opcode = self.byte()?;
         match opcode {
             0x00 | 0x01 | 0x05 | END | 0x0f | 0x1a | 0x1b | 0x45..=0xc4 | 0xd1 => {}
@@ -210,7 +210,7 @@ impl<'a> Reader<'a> {
             0x10 | 0xd2 => {
                 let before = self.0.len();
                 let function = self.number()?;
-                return Ok((opcode, Some(Named { function, length: before - self.0.len() })));
+                return Ok((opcode, Some(FunctionIndex { function, length: before - self.0.len() })));
             }
             0x11 | 0x28..=0x3e => self.skip_numbers(2)?,
             // A table of branches, and the one besides.

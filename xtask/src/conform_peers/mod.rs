@@ -53,11 +53,11 @@ fn table(words: &[&str]) -> Result<bool, String> {
         .collect();
     let nodes = chosen.iter().map(|stack| {
         let explained = page::explained(&page, stack.name)?;
-        Ok(Node { command: stack.command()?, eds: stack.eds.file(stack.name)?, explained })
+        Ok(PeerNode { command: stack.command()?, eds: stack.eds.file(stack.name)?, explained })
     });
     let nodes = nodes.collect::<Result<Vec<_>, String>>()?;
     // The suite waits most of the time: each stack has a bus of its own, and all run at once.
-    let asked: Vec<Result<Asked, String>> = std::thread::scope(|scope| {
+    let asked: Vec<Result<CaseResults, String>> = std::thread::scope(|scope| {
         let running: Vec<_> = nodes.iter().map(|node| scope.spawn(|| node.asked(&program))).collect();
         running.into_iter().map(|thread| thread.join().unwrap_or_else(|_| Err("panicked".to_owned()))).collect()
     });
@@ -74,7 +74,7 @@ fn table(words: &[&str]) -> Result<bool, String> {
 }
 
 /// A node of a stack, how it is started, and the cases that the page says it fails.
-struct Node {
+struct PeerNode {
     command: Command,
     eds: PathBuf,
     explained: BTreeSet<String>,
@@ -82,7 +82,7 @@ struct Node {
 
 /// The cases that a node was asked, by their last results, in order; and what was left otherwise than it was.
 #[derive(Default)]
-struct Asked {
+struct CaseResults {
     cases: Vec<Value>,
     not_restored: Vec<Value>,
 }
@@ -91,7 +91,7 @@ fn text<'a>(case: &'a Value, name: &str) -> &'a str {
     case[name].as_str().unwrap_or_default()
 }
 
-impl Asked {
+impl CaseResults {
     fn count(&self, result: &str) -> u64 {
         self.cases.iter().filter(|case| case["result"] == result).count() as u64
     }
@@ -156,10 +156,10 @@ fn started(command: &mut Command) -> Result<(Ends, String), String> {
     Ok((child, line.trim().to_owned()))
 }
 
-impl Node {
+impl PeerNode {
     /// Asks all cases, and those again whose results differ from the page.
-    fn asked(&self, program: &Path) -> Result<Asked, String> {
-        let mut asked = Asked::default();
+    fn asked(&self, program: &Path) -> Result<CaseResults, String> {
+        let mut asked = CaseResults::default();
         let mut only = String::new();
         let mut failure = None;
         for _ in 0..=AGAIN {
@@ -213,10 +213,10 @@ mod tests {
     fn what_differs_from_the_page_is_by_the_last_run_that_asked_it() {
         let case = |id: &str, result: &str| json!({ "id": id, "result": result });
         let explained = BTreeSet::from(["SDO 05".to_owned(), "PDO 03".to_owned()]);
-        let ids = |asked: &Asked| -> Vec<String> {
+        let ids = |asked: &CaseResults| -> Vec<String> {
             asked.differing(&explained).iter().map(|case| text(case, "id").to_owned()).collect()
         };
-        let mut asked = Asked::default();
+        let mut asked = CaseResults::default();
         let first = [case("SDO 01", "pass"), case("SDO 05", "fail"), case("HB 02", "fail"), case("PDO 03", "pass")];
         asked.take(json!({ "cases": first, "not_restored": ["1017h"] }));
         assert_eq!(ids(&asked), ["HB 02", "PDO 03"]);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use super::modules::Tree;
-use super::resolve::Found;
+use super::resolve::Resolved;
 
 /// The files of a crate and who names whom.
 pub(super) struct Graph {
@@ -37,7 +37,7 @@ impl Graph {
                 graph.add(tree, module, *line, tree.resolve(module, path));
             }
             for (name, line) in &tree.modules[module].calls {
-                let written = tree.macros.get(name).map(|at| Found::Item(*at, name.clone()));
+                let written = tree.macros.get(name).map(|at| Resolved::Item(*at, name.clone()));
                 graph.add(tree, module, *line, written);
             }
         }
@@ -52,11 +52,11 @@ impl Graph {
                 Some(alias) if import.passed_on && !inside.names.contains(alias) => {}
                 Some(_) => self.add(tree, module, import.line, tree.resolve(module, &import.path)),
                 None => {
-                    let Some(Found::Module(from)) = tree.resolve(module, &import.path) else { continue };
+                    let Some(Resolved::Module(from)) = tree.resolve(module, &import.path) else { continue };
                     for name in &inside.names {
                         if !inside.defined.contains(name) && !inside.children.contains_key(name) {
                             let found = tree.resolve(from, &["self".to_owned(), name.clone()]);
-                            let is_there = |found: &Found| tree.defines(found);
+                            let is_there = |found: &Resolved| tree.defines(found);
                             self.add(tree, module, import.line, found.filter(is_there));
                         }
                     }
@@ -65,8 +65,8 @@ impl Graph {
         }
     }
 
-    fn add(&mut self, tree: &Tree, module: usize, line: usize, found: Option<Found>) {
-        let Some(Found::Item(owner, name)) = found else { return };
+    fn add(&mut self, tree: &Tree, module: usize, line: usize, found: Option<Resolved>) {
+        let Some(Resolved::Item(owner, name)) = found else { return };
         let (from, to) = (tree.modules[module].file, tree.modules[owner].file);
         if from != to {
             self.join(Edge { from, to, line, name });
@@ -146,7 +146,7 @@ impl Graph {
 
 impl Tree {
     /// Whether an item's module is seen to define it.
-    fn defines(&self, found: &Found) -> bool {
-        matches!(found, Found::Item(module, name) if self.modules[*module].defined.contains(name))
+    fn defines(&self, found: &Resolved) -> bool {
+        matches!(found, Resolved::Item(module, name) if self.modules[*module].defined.contains(name))
     }
 }
