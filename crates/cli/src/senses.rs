@@ -10,7 +10,7 @@ use crate::word_order::{parses, text};
 
 /// Words of one sense, and what is typed here in their place. A word may be two: `sdo read`; `#` stands for a node, `=` for
 /// a node and its value.
-struct Row {
+struct Sense {
     words: &'static [&'static str],
     tips: &'static [&'static str],
 }
@@ -20,8 +20,8 @@ const MOVING: [&str; 10] =
     ["enable", "velocity", "move", "torque", "home", "group", "drive-base", "replay", "tune", "test-motion"];
 
 /// Words of people who want to see something, or to have it stop: no tip may set a motor in motion.
-const LOOKING: &[Row] = &[
-    Row {
+const LOOKING: &[Sense] = &[
+    Sense {
         words: &[
             "e-stop",
             "emergency",
@@ -35,8 +35,8 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["estop", "stop 4"],
     },
-    Row { words: &["quickstop", "quick_stop", "brake"], tips: &["quick-stop 4", "estop"] },
-    Row {
+    Sense { words: &["quickstop", "quick_stop", "brake"], tips: &["quick-stop 4", "estop"] },
+    Sense {
         words: &[
             "candump",
             "isotpdump",
@@ -51,24 +51,24 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["dump"],
     },
-    Row { words: &["monitor", "mon", "live"], tips: &["top", "watch 4 statusword 606C", "dump"] },
-    Row {
+    Sense { words: &["monitor", "mon", "live"], tips: &["top", "watch 4 statusword 606C", "dump"] },
+    Sense {
         words: &["list", "ls", "devices", "discover", "nodes", "node list", "search", "ping", "who", "bus"],
         tips: &["scan"],
     },
-    Row { words: &["info", "identify", "id", "describe", "node info"], tips: &["scan", "state 4"] },
-    Row { words: &["mode", "modes", "opmode", "set-mode"], tips: &["state 4", "write --help"] },
-    Row { words: &["accel", "acceleration", "ramp", "ramps"], tips: &["objects 4 acceleration"] },
-    Row { words: &["diff", "compare"], tips: &["params diff 4 drive.toml", "eds diff vendor.eds zlac8030l"] },
-    Row { words: &["heartbeat", "hb", "alive", "watchdog"], tips: &["scan", "supervise"] },
-    Row { words: &["canbusload", "busload", "load"], tips: &["plan", "top"] },
-    Row { words: &["nmt-state", "lifecycle"], tips: &["scan", "nmt 4 start --wait"] },
-    Row { words: &["status", "stat", "show", "drv-status", "query"], tips: &["state 4"] },
-    Row {
+    Sense { words: &["info", "identify", "id", "describe", "node info"], tips: &["scan", "state 4"] },
+    Sense { words: &["mode", "modes", "opmode", "set-mode"], tips: &["state 4", "write --help"] },
+    Sense { words: &["accel", "acceleration", "ramp", "ramps"], tips: &["objects 4 acceleration"] },
+    Sense { words: &["diff", "compare"], tips: &["params diff 4 drive.toml", "eds diff vendor.eds zlac8030l"] },
+    Sense { words: &["heartbeat", "hb", "alive", "watchdog"], tips: &["scan", "supervise"] },
+    Sense { words: &["canbusload", "busload", "load"], tips: &["plan", "top"] },
+    Sense { words: &["nmt-state", "lifecycle"], tips: &["scan", "nmt 4 start --wait"] },
+    Sense { words: &["status", "stat", "show", "drv-status", "query"], tips: &["state 4"] },
+    Sense {
         words: &["temperature", "voltage", "current", "statusword", "encoder", "angle"],
         tips: &["state 4", "watch 4 statusword 6064"],
     },
-    Row {
+    Sense {
         words: &[
             "fault",
             "fix",
@@ -86,15 +86,15 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["explain 4", "state 4", "emcy show 4"],
     },
-    Row { words: &["emergencies", "emergency-messages"], tips: &["emcy watch"] },
-    Row {
+    Sense { words: &["emergencies", "emergency-messages"], tips: &["emcy watch"] },
+    Sense {
         words: &["get", "sdo read", "sdo get", "sdo upload", "sdo", "upload", "param get", "rd", "peek"],
         tips: &["read 4 6064"],
     },
-    Row { words: &["od", "dictionary", "dict", "objdict", "param list", "registers"], tips: &["objects 4"] },
-    Row { words: &["topic", "echo", "follow-object", "tail", "poll"], tips: &["watch 4 statusword 606C"] },
-    Row { words: &["mapping", "rpdo", "tpdo"], tips: &["pdo show 4"] },
-    Row {
+    Sense { words: &["od", "dictionary", "dict", "objdict", "param list", "registers"], tips: &["objects 4"] },
+    Sense { words: &["topic", "echo", "follow-object", "tail", "poll"], tips: &["watch 4 statusword 606C"] },
+    Sense { words: &["mapping", "rpdo", "tpdo"], tips: &["pdo show 4"] },
+    Sense {
         words: &[
             "backup",
             "backup-config",
@@ -106,10 +106,10 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["params backup 4 -o drive.toml"],
     },
-    Row { words: &["param", "parameter", "parameters"], tips: &["params backup 4", "read 4 6081"] },
-    Row { words: &["log", "logger", "canlogger", "candump-log", "save-log"], tips: &["dump --log trace.log"] },
-    Row { words: &["trace", "tracing", "spy"], tips: &["dump", "dump --log trace.log", "state 4 -v"] },
-    Row {
+    Sense { words: &["param", "parameter", "parameters"], tips: &["params backup 4", "read 4 6081"] },
+    Sense { words: &["log", "logger", "canlogger", "candump-log", "save-log"], tips: &["dump --log trace.log"] },
+    Sense { words: &["trace", "tracing", "spy"], tips: &["dump", "dump --log trace.log", "state 4 -v"] },
+    Sense {
         words: &[
             "scope",
             "oscilloscope",
@@ -123,60 +123,60 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["top", "studio", "record 4 606C 6077 -o run.mcap --for 5s"],
     },
-    Row { words: &["graph", "draw", "chart"], tips: &["plot run.mcap"] },
-    Row { words: &["log2asc", "asc2log", "log2long", "export-log"], tips: &["convert trace.log trace.asc"] },
-    Row { words: &["parse", "decoder"], tips: &["decode trace.log"] },
-    Row { words: &["dbc"], tips: &["export dbc"] },
-    Row {
+    Sense { words: &["graph", "draw", "chart"], tips: &["plot run.mcap"] },
+    Sense { words: &["log2asc", "asc2log", "log2long", "export-log"], tips: &["convert trace.log trace.asc"] },
+    Sense { words: &["parse", "decoder"], tips: &["decode trace.log"] },
+    Sense { words: &["dbc"], tips: &["export dbc"] },
+    Sense {
         words: &["lint", "validate", "verify"],
         tips: &["check machine.toml", "eds lint vendor.eds", "params verify 4 drive.toml"],
     },
-    Row {
+    Sense {
         words: &["params #", "params list", "params show", "params get", "params read", "params dump", "params export"],
         tips: &["params backup 4 -o drive.toml", "read 4 6081", "objects 4"],
     },
-    Row {
+    Sense {
         words: &["params compare", "params check"],
         tips: &["params diff 4 drive.toml", "params verify 4 drive.toml"],
     },
-    Row {
+    Sense {
         words: &["pdo #", "pdo list", "pdo map", "pdo mapping", "pdo get", "pdo read", "pdo info"],
         tips: &["pdo show 4"],
     },
-    Row { words: &["pdo monitor", "pdo dump", "pdo listen"], tips: &["pdo watch 4"] },
-    Row { words: &["lss find", "lss list", "lss fastscan", "lss discover", "lss search"], tips: &["lss scan"] },
-    Row { words: &["lss get", "lss info", "lss id", "lss show"], tips: &["lss inquire only"] },
-    Row {
+    Sense { words: &["pdo monitor", "pdo dump", "pdo listen"], tips: &["pdo watch 4"] },
+    Sense { words: &["lss find", "lss list", "lss fastscan", "lss discover", "lss search"], tips: &["lss scan"] },
+    Sense { words: &["lss get", "lss info", "lss id", "lss show"], tips: &["lss inquire only"] },
+    Sense {
         words: &["emcy #", "emcy list", "emcy history", "emcy read", "emcy get", "emcy log"],
         tips: &["emcy show 4"],
     },
-    Row { words: &["emcy monitor", "emcy listen", "emcy dump"], tips: &["emcy watch"] },
-    Row { words: &["eds check", "eds validate", "eds verify"], tips: &["eds lint vendor.eds"] },
-    Row { words: &["eds info", "eds print", "eds list", "eds objects", "eds dump"], tips: &["eds show vendor.eds"] },
-    Row { words: &["eds compare"], tips: &["eds diff vendor.eds zlac8030l"] },
-    Row {
+    Sense { words: &["emcy monitor", "emcy listen", "emcy dump"], tips: &["emcy watch"] },
+    Sense { words: &["eds check", "eds validate", "eds verify"], tips: &["eds lint vendor.eds"] },
+    Sense { words: &["eds info", "eds print", "eds list", "eds objects", "eds dump"], tips: &["eds show vendor.eds"] },
+    Sense { words: &["eds compare"], tips: &["eds diff vendor.eds zlac8030l"] },
+    Sense {
         words: &["eds generate", "eds export", "eds create", "eds make", "eds write", "export eds"],
         tips: &["eds zlac8030l -o zlac8030l.eds"],
     },
-    Row { words: &["export dcf"], tips: &["dcf 4 -o drive.dcf"] },
-    Row { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], tips: &["studio"] },
-    Row { words: &["measure", "measurement"], tips: &["capture 4 606C 6077 -o run.mcap", "top"] },
-    Row {
+    Sense { words: &["export dcf"], tips: &["dcf 4 -o drive.dcf"] },
+    Sense { words: &["gui", "ui", "web", "dashboard", "serve", "browser"], tips: &["studio"] },
+    Sense { words: &["measure", "measurement"], tips: &["capture 4 606C 6077 -o run.mcap", "top"] },
+    Sense {
         words: &["server"],
         tips: &["studio", "sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536", "gateway"],
     },
-    Row {
+    Sense {
         words: &["ros2", "ros"],
         tips: &["check bus.yml", "sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536"],
     },
-    Row { words: &["shell", "console", "repl", "interactive", "tui", "htop"], tips: &["top", "studio"] },
-    Row {
+    Sense { words: &["shell", "console", "repl", "interactive", "tui", "htop"], tips: &["top", "studio"] },
+    Sense {
         words: &["simulate", "simulator", "emulate", "virtual", "mock", "start-sim"],
         tips: &["sim --drive zlac8030l@4 --serve socketcand://127.0.0.1:29536"],
     },
-    Row { words: &["scenario", "scenarios"], tips: &["run scenario.toml", "demo"] },
-    Row { words: &["test", "tests"], tips: &["run scenario.toml", "conform 4", "demo"] },
-    Row {
+    Sense { words: &["scenario", "scenarios"], tips: &["run scenario.toml", "demo"] },
+    Sense { words: &["test", "tests"], tips: &["run scenario.toml", "conform 4", "demo"] },
+    Sense {
         words: &[
             "conformance",
             "conformity",
@@ -193,25 +193,25 @@ const LOOKING: &[Row] = &[
         ],
         tips: &["conform 4", "conform --list"],
     },
-    Row { words: &["connect", "open", "interface", "interfaces"], tips: &["--bus can0 scan"] },
-    Row { words: &["version"], tips: &["--version"] },
-    Row {
+    Sense { words: &["connect", "open", "interface", "interfaces"], tips: &["--bus can0 scan"] },
+    Sense { words: &["version"], tips: &["--version"] },
+    Sense {
         words: &["off", "disarm", "idle", "power-off", "torque-off", "release", "shutdown"],
         tips: &["disable 4", "estop"],
     },
 ];
 
 /// Words of people who want to change or to move something.
-const ACTING: &[Row] = &[
-    Row { words: &["autotune", "auto-tune", "tuning", "inertia"], tips: &["tune 4", "objects 4 gain"] },
-    Row { words: &["gains", "pid"], tips: &["objects 4 gain", "tune 4", "params backup 4 -o gains.toml"] },
-    Row { words: &["bode", "frequency", "sweep"], tips: &["tune 4", "test-motion 4 chirp"] },
-    Row { words: &["excite", "excitation", "chirp", "sine"], tips: &["test-motion 4 chirp", "test-motion 4 sine"] },
-    Row { words: &["power"], tips: &["state 4", "enable 4", "disable 4"] },
-    Row { words: &["pv"], tips: &["state 4", "velocity 4 60rpm"] },
-    Row { words: &["pp"], tips: &["state 4", "move 4 90deg"] },
-    Row { words: &["ip", "csp", "csv", "cst"], tips: &["state 4", "group move 1=90deg"] },
-    Row {
+const ACTING: &[Sense] = &[
+    Sense { words: &["autotune", "auto-tune", "tuning", "inertia"], tips: &["tune 4", "objects 4 gain"] },
+    Sense { words: &["gains", "pid"], tips: &["objects 4 gain", "tune 4", "params backup 4 -o gains.toml"] },
+    Sense { words: &["bode", "frequency", "sweep"], tips: &["tune 4", "test-motion 4 chirp"] },
+    Sense { words: &["excite", "excitation", "chirp", "sine"], tips: &["test-motion 4 chirp", "test-motion 4 sine"] },
+    Sense { words: &["power"], tips: &["state 4", "enable 4", "disable 4"] },
+    Sense { words: &["pv"], tips: &["state 4", "velocity 4 60rpm"] },
+    Sense { words: &["pp"], tips: &["state 4", "move 4 90deg"] },
+    Sense { words: &["ip", "csp", "csv", "cst"], tips: &["state 4", "group move 1=90deg"] },
+    Sense {
         words: &[
             "clear",
             "clear-faults",
@@ -224,11 +224,11 @@ const ACTING: &[Row] = &[
         ],
         tips: &["reset 4"],
     },
-    Row {
+    Sense {
         words: &["set", "sdo write", "sdo set", "sdo download", "download", "param set", "wr", "poke", "assign"],
         tips: &["write 4 6081 120"],
     },
-    Row {
+    Sense {
         words: &[
             "restore-config",
             "restore_config",
@@ -241,53 +241,59 @@ const ACTING: &[Row] = &[
         ],
         tips: &["params plan 4 drive.toml", "params apply 4 drive.toml", "params backup 4 -o drive.toml"],
     },
-    Row { words: &["store", "save_configuration", "persist"], tips: &["save 4"] },
-    Row { words: &["rollback", "roll-back", "undo"], tips: &["params rollback 4"] },
-    Row { words: &["flash", "firmware", "update", "upgrade", "bootloader"], tips: &["program 4 firmware.bin"] },
-    Row { words: &["params set", "params write"], tips: &["write 4 6081 120", "params apply 4 drive.toml"] },
-    Row { words: &["params load", "params import"], tips: &["params plan 4 drive.toml", "params apply 4 drive.toml"] },
-    Row {
+    Sense { words: &["store", "save_configuration", "persist"], tips: &["save 4"] },
+    Sense { words: &["rollback", "roll-back", "undo"], tips: &["params rollback 4"] },
+    Sense { words: &["flash", "firmware", "update", "upgrade", "bootloader"], tips: &["program 4 firmware.bin"] },
+    Sense { words: &["params set", "params write"], tips: &["write 4 6081 120", "params apply 4 drive.toml"] },
+    Sense {
+        words: &["params load", "params import"],
+        tips: &["params plan 4 drive.toml", "params apply 4 drive.toml"],
+    },
+    Sense {
         words: &["params restore", "params reset", "params undo"],
         tips: &["params apply 4 drive.toml", "params rollback 4", "restore 4"],
     },
-    Row { words: &["params save", "params store"], tips: &["save 4", "params backup 4 -o drive.toml"] },
-    Row {
+    Sense { words: &["params save", "params store"], tips: &["save 4", "params backup 4 -o drive.toml"] },
+    Sense {
         words: &["pdo set", "pdo configure", "pdo config", "pdo write"],
         tips: &["pdo plan 4 tpdo1=statusword", "pdo apply 4 tpdo1=statusword"],
     },
-    Row {
+    Sense {
         words: &["lss set-id", "lss node-id", "lss assign", "lss configure", "lss store"],
         tips: &["lss set only --node-id 5 --store"],
     },
-    Row { words: &["lss bitrate", "lss baudrate"], tips: &["lss set only --bitrate 250k --store"] },
-    Row { words: &["emcy clear", "emcy reset"], tips: &["reset 4", "write 4 1003:00 0"] },
-    Row { words: &["group ="], tips: &["group move 1=90deg"] },
-    Row {
+    Sense { words: &["lss bitrate", "lss baudrate"], tips: &["lss set only --bitrate 250k --store"] },
+    Sense { words: &["emcy clear", "emcy reset"], tips: &["reset 4", "write 4 1003:00 0"] },
+    Sense { words: &["group ="], tips: &["group move 1=90deg"] },
+    Sense {
         words: &["factory-reset", "factory", "defaults", "erase", "erase_configuration", "erase-config"],
         tips: &["restore 4"],
     },
-    Row { words: &["reboot", "restart"], tips: &["nmt 4 reset --wait"] },
-    Row {
+    Sense { words: &["reboot", "restart"], tips: &["nmt 4 reset --wait"] },
+    Sense {
         words: &["set-id", "node-id", "nodeid", "address", "baudrate", "bitrate", "baud"],
         tips: &["lss scan", "lss set --help"],
     },
-    Row { words: &["cansend", "cangen", "transmit", "tx", "pub", "publish"], tips: &["send 604#4041600000000000"] },
-    Row { words: &["canplayer", "play", "playback", "bag play"], tips: &["replay trace.log --skip-motion"] },
-    Row { words: &["launch", "bringup", "up"], tips: &["boot", "nmt 4 start"] },
-    Row { words: &["start"], tips: &["nmt 4 start"] },
-    Row { words: &["on", "arm", "power-on", "torque-on", "closed_loop_control"], tips: &["enable 4"] },
-    Row { words: &["jog", "spin", "rotate", "turn"], tips: &["velocity 4 60rpm --for 2s", "move 4 --relative 90deg"] },
-    Row { words: &["speed", "vel", "rpm"], tips: &["state 4", "velocity 4 60rpm"] },
-    Row { words: &["goto", "go", "pos", "position", "moveto", "mv"], tips: &["state 4", "move 4 90deg"] },
-    Row {
+    Sense { words: &["cansend", "cangen", "transmit", "tx", "pub", "publish"], tips: &["send 604#4041600000000000"] },
+    Sense { words: &["canplayer", "play", "playback", "bag play"], tips: &["replay trace.log --skip-motion"] },
+    Sense { words: &["launch", "bringup", "up"], tips: &["boot", "nmt 4 start"] },
+    Sense { words: &["start"], tips: &["nmt 4 start"] },
+    Sense { words: &["on", "arm", "power-on", "torque-on", "closed_loop_control"], tips: &["enable 4"] },
+    Sense {
+        words: &["jog", "spin", "rotate", "turn"],
+        tips: &["velocity 4 60rpm --for 2s", "move 4 --relative 90deg"],
+    },
+    Sense { words: &["speed", "vel", "rpm"], tips: &["state 4", "velocity 4 60rpm"] },
+    Sense { words: &["goto", "go", "pos", "position", "moveto", "mv"], tips: &["state 4", "move 4 90deg"] },
+    Sense {
         words: &["calibrate", "calibration", "zero", "set-zero", "homing", "reference"],
         tips: &["state 4", "home 4 --method 35"],
     },
-    Row {
+    Sense {
         words: &["follow", "trajectory", "path", "interpolate"],
         tips: &["group follow path.csv --approach", "group move 1=90deg"],
     },
-    Row { words: &["drive", "cmd_vel", "twist"], tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"] },
+    Sense { words: &["drive", "cmd_vel", "twist"], tips: &["drive-base examples/base.toml --linear 0.2 --for 2s"] },
 ];
 
 /// What is typed here in place of the word at `place`, with the nodes, objects, values and options that were typed.

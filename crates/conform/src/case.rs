@@ -26,10 +26,10 @@ pub struct Case {
     pub needs: &'static [Need],
     /// Keys of the departures ([`devices::Departure::key`]) by which a device fails it as its maker's manual states.
     pub departures: &'static [&'static str],
-    pub(crate) run: Run,
+    pub(crate) run: RunCase,
 }
 
-pub(crate) type Run = for<'a> fn(&'a mut Bench) -> Pin<Box<dyn Future<Output = Verdict> + 'a>>;
+pub(crate) type RunCase = for<'a> fn(&'a mut Bench) -> Pin<Box<dyn Future<Output = Verdict> + 'a>>;
 
 /// A part of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -32,7 +32,7 @@ const OVERHEARING: Duration = Duration::from_secs(1);
     disable_version_flag = true,
     override_usage = "COMMAND [OPTIONS]; help COMMAND describes one"
 )]
-struct Line {
+struct CommandLine {
     #[command(subcommand)]
     command: LineCommand,
 }
@@ -56,7 +56,7 @@ impl host::console::Reader for Reader {
         // As a line is copied from the manual.
         let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
         let matches = parser().try_get_matches_from(words).map_err(|error| said(&error))?;
-        let Line { command } = Line::from_arg_matches(&matches).map_err(|error| said(&error))?;
+        let CommandLine { command } = CommandLine::from_arg_matches(&matches).map_err(|error| said(&error))?;
         let effect = match &command {
             LineCommand::Read(_) => Effect::None,
             LineCommand::OnBus(command) => {
@@ -99,7 +99,7 @@ const HIDDEN: [&str; 2] = ["guard", "from"];
 
 /// The parser of the command line; its help names nothing that a line does not have.
 fn parser() -> clap::Command {
-    Line::command().mut_subcommands(|command| {
+    CommandLine::command().mut_subcommands(|command| {
         let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let mut lines: Vec<String> = Vec::new();
         for line in examples

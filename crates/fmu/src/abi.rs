@@ -20,12 +20,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
 
 use crate::call::{CallError, Called};
-use held::{Held, instance};
+use held::{LoggedInstance, instance};
 use status::{DEFECT, ERROR, FATAL, OK, Status};
 
 /// Carries out a call on an instance; what goes wrong is reported to the importer's log. After a panic the instance is of no use
 /// until it is reset.
-fn call(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Called<()>) -> Status {
+fn call(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Called<()>) -> Status {
     carry_out(handle, |held| {
         if held.is_broken {
             return Err((FATAL, "an earlier call ended with Fatal; Reset makes the instance anew".to_owned()));
@@ -35,7 +35,7 @@ fn call(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Called<()>) -> Stat
 }
 
 /// The same, also after a panic.
-fn carry_out(handle: *mut c_void, work: impl FnOnce(&mut Held) -> Result<(), (Status, String)>) -> Status {
+fn carry_out(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Result<(), (Status, String)>) -> Status {
     let Some(instance) = instance(handle) else { return ERROR };
     let (log, done) = {
         // No panic leaves this block: the lock is never poisoned.
@@ -130,7 +130,7 @@ mod tests {
         let config = BusConfig { nodes: 2, bitrate: 500_000, clock: TxClock::Countdown };
         let instance = Instance::of(Config::Bus(config), ".".as_ref(), false).unwrap();
         let log = held::Log::new(std::ptr::from_mut(place).cast(), message);
-        *place = held::add(Held::new(instance, log));
+        *place = held::add(LoggedInstance::new(instance, log));
     }
 
     #[test]

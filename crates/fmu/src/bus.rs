@@ -31,13 +31,13 @@ pub struct BusUnit {
     corrupted: f64,
     now: Instant,
     begin: Instant,
-    nodes: Vec<Node>,
+    nodes: Vec<BusNode>,
     overflows: u64,
 }
 
 /// What the bus knows of a node.
 #[derive(Clone, Default)]
-struct Node {
+struct BusNode {
     lost: LostFrame,
     /// It has said that it takes no part.
     is_off: bool,
@@ -64,7 +64,7 @@ impl BusUnit {
             corrupted: 0.0,
             now: Instant::ZERO,
             begin: Instant::ZERO,
-            nodes: vec![Node::default(); config.nodes.into()],
+            nodes: vec![BusNode::default(); config.nodes.into()],
             overflows: 0,
         })
     }

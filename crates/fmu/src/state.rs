@@ -12,7 +12,7 @@ pub struct SavedState(Box<Instance>);
 /// What a state is as bytes: of what FMU, and what was done to it since its begin. Taking it back does all that again, a few
 /// milliseconds for each simulated second.
 #[derive(Serialize, Deserialize)]
-struct Written {
+struct StateBytes {
     token: String,
     actions: Vec<Action>,
     rest: crate::instance::Rest,
@@ -45,7 +45,7 @@ impl SavedState {
     /// More was done to it than is kept.
     pub fn bytes(&self) -> Called<Vec<u8>> {
         let instance = &self.0;
-        let written = Written {
+        let written = StateBytes {
             token: instance.token.clone(),
             actions: instance.journal.actions()?.to_vec(),
             rest: instance.rest(),
@@ -67,7 +67,7 @@ impl SavedState {
         if sum != crc32fast::hash(body).to_le_bytes() {
             return Err(error("its check sum is wrong".to_owned()));
         }
-        let written: Written = rmp_serde::from_slice(body).map_err(|torn| error(torn.to_string()))?;
+        let written: StateBytes = rmp_serde::from_slice(body).map_err(|torn| error(torn.to_string()))?;
         if written.token != of.token {
             return Err(error(format!("it is of {}; expected {}", written.token, of.token)));
         }

@@ -21,12 +21,12 @@ const REPORT_INTERVAL_NANOS: u64 = 1_000_000_000;
 /// One client, as its tasks and the hub share it.
 #[derive(Default)]
 pub(crate) struct Client {
-    state: RefCell<State>,
+    state: RefCell<ClientState>,
     filled: Notify,
 }
 
 #[derive(Default)]
-struct State {
+struct ClientState {
     /// Its number of the subscription of each channel.
     subscriptions: BTreeMap<usize, u32>,
     texts: VecDeque<String>,
@@ -140,7 +140,7 @@ impl Client {
     }
 }
 
-impl State {
+impl ClientState {
     fn push(&mut self, message: Vec<u8>) {
         self.bytes += message.len();
         self.data.push_back(message);

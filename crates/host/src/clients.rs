@@ -18,7 +18,7 @@ const REQUESTS: usize = 64;
 /// Lets clients in.
 #[derive(Clone, Debug)]
 pub struct Clients {
-    guard: mpsc::Sender<Guard>,
+    guard: mpsc::Sender<GuardRequest>,
     gone: mpsc::UnboundedSender<Gone>,
 }
 
@@ -31,7 +31,7 @@ pub struct Client {
 
 /// These nodes are about to be moved: answered when they are guarded, as far as they can be.
 #[derive(Debug)]
-struct Guard(NodeSet, oneshot::Sender<()>);
+struct GuardRequest(NodeSet, oneshot::Sender<()>);
 
 /// A client has gone.
 #[derive(Debug)]
@@ -85,7 +85,7 @@ impl Client {
         // What was asked for is given back when the client goes, which may be before the answer.
         let Ok(permit) = self.clients.guard.reserve().await else { return };
         nodes.iter().for_each(|node| self.guarded.insert(node));
-        permit.send(Guard(nodes, done));
+        permit.send(GuardRequest(nodes, done));
         let _ = answered.await;
     }
 
@@ -105,7 +105,7 @@ async fn see_guarded(
     who: &str,
     drive: &impl AsyncFn(NodeId) -> Result<Drive, String>,
     note: &impl Fn(&str),
-    mut asked: mpsc::Receiver<Guard>,
+    mut asked: mpsc::Receiver<GuardRequest>,
     mut left: mpsc::UnboundedReceiver<NodeSet>,
 ) {
     let mut guards = Guards::default();
@@ -113,7 +113,7 @@ async fn see_guarded(
         tokio::select! {
             biased;
             // A client asks before it goes.
-            Some(Guard(nodes, done)) = asked.recv() => {
+            Some(GuardRequest(nodes, done)) = asked.recv() => {
                 for node in guards.take(nodes).iter() {
                     match guard(drive, node).await {
                         Ok(()) => guards.note(node),

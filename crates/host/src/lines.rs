@@ -17,7 +17,7 @@ use crate::motion::guarding::guard;
 use crate::nodes::known_node::KnownNode;
 use crate::session::authority::SessionId;
 use crate::state::Host;
-use crate::work::{Asked, Done, Line, LineOf, send};
+use crate::work::{Asked, Done, LineOf, OpenLine, send};
 
 /// Lines that may be under way when one begins that only looks.
 const MOST_LINES: usize = 32;
@@ -77,7 +77,7 @@ impl Host {
         let alive = Rc::new(());
         if let Some(of) = of {
             self.open_lines.retain(|line| line.alive.strong_count() > 0);
-            self.open_lines.push(Line { of, abort, alive: Rc::downgrade(&alive) });
+            self.open_lines.push(OpenLine { of, abort, alive: Rc::downgrade(&alive) });
         }
         self.work.push(Box::pin(async move {
             let replaced = || Said::refused("replaced", "replaced by another command to the drive");

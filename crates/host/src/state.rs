@@ -26,7 +26,7 @@ use crate::session::handle::{HostHandle, Inbox, channel};
 use crate::trace::{Origin, Trace};
 use crate::tune::Tuned;
 use crate::wire::Wire;
-use crate::work::{Line, Listening, Running, Work};
+use crate::work::{Listening, OpenLine, Running, Work};
 use crate::world::changes::Changes;
 use crate::world::door::WorldDoor;
 
@@ -103,7 +103,7 @@ pub struct Host {
     /// Lines of consoles that are under way.
     pub(crate) lines: usize,
     /// Those of them that end before they are done with what they are of.
-    pub(crate) open_lines: Vec<Line>,
+    pub(crate) open_lines: Vec<OpenLine>,
     pub(crate) parameters: Transactions,
     /// Captures under way.
     pub(crate) captures: BTreeMap<NodeId, CaptureRun>,

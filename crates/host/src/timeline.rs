@@ -87,11 +87,11 @@ pub struct Entry {
 /// The events so far. Cheap to clone and to read from any thread.
 #[derive(Debug, Default)]
 pub struct Timeline {
-    kept: Mutex<Kept>,
+    kept: Mutex<EntryStore>,
 }
 
 #[derive(Debug, Default)]
-struct Kept {
+struct EntryStore {
     entries: VecDeque<Entry>,
     next: u64,
     revision: u64,
@@ -132,13 +132,13 @@ impl Timeline {
         News { revision: kept.revision, oldest, entries }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Kept> {
+    fn lock(&self) -> MutexGuard<'_, EntryStore> {
         // Events are added whole: a panic elsewhere leaves the list consistent.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Kept {
+impl EntryStore {
     fn push(&mut self, event: TimelineEvent) {
         let TimelineEvent { at, node, kind, what, code, remedy, source } = event;
         let at_s = seconds(at);

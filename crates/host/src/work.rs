@@ -36,7 +36,7 @@ pub(crate) type Asked = (u64, oneshot::Sender<Answer>);
 pub(crate) const STOPPING: &str = "stopping";
 
 /// A line of a console that is under way beside the commands of drives.
-pub(crate) struct Line {
+pub(crate) struct OpenLine {
     pub(crate) of: LineOf,
     pub(crate) abort: AbortHandle,
     /// Dropped with the line.

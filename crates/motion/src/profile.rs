@@ -223,19 +223,19 @@ pub(crate) fn velocity_change(shape: Shape, from: f64, to: f64, duration_s: f64)
 
 /// How long a change of speed takes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Ramp {
+pub(crate) enum SpeedChange {
     /// Seconds per unit of speed; zero is a step.
     Pace(f64),
     /// Seconds for the change to the plateau from wherever it starts.
     Time(f64),
 }
 
-impl Ramp {
+impl SpeedChange {
     /// Seconds per unit of speed on the way to the plateau.
     fn pace(self, start: f64, max_speed: f64) -> f64 {
         match self {
-            Ramp::Pace(pace) => pace,
-            Ramp::Time(time_s) => pace(time_s, start, max_speed).unwrap_or(0.0),
+            SpeedChange::Pace(pace) => pace,
+            SpeedChange::Time(time_s) => pace(time_s, start, max_speed).unwrap_or(0.0),
         }
     }
 }
@@ -250,7 +250,7 @@ pub(crate) struct MoveLimits {
     /// The motion ends with a step from this speed to rest.
     pub(crate) end_speed: f64,
     /// How it speeds up.
-    pub(crate) acceleration: Ramp,
+    pub(crate) acceleration: SpeedChange,
     /// Seconds per unit of speed while slowing down to the end; zero is a step.
     pub(crate) deceleration_pace: f64,
     /// Seconds per unit of speed while stopping a motion that cannot end at the target.

@@ -7,7 +7,7 @@
 //! A move too short for its full speed keeps the pace of the full change, with a lower peak and shorter times: no
 //! manual states it, but the alternative, the full times for any short move, would take a second for one count.
 
-use crate::profile::{self, MoveLimits, Profile, Ramp, Shape, pace, sane, sane_speed, sane_time};
+use crate::profile::{self, MoveLimits, Profile, Shape, SpeedChange, pace, sane, sane_speed, sane_time};
 
 /// Change of velocity from `from` to `to` (units/s) in `time_s`. Zero time is a step.
 pub fn velocity_change(from: f64, to: f64, time_s: f64) -> Profile {
@@ -50,7 +50,7 @@ impl PositionMove {
             start_speed,
             max_speed,
             end_speed,
-            acceleration: Ramp::Time(sane_time(self.acceleration_time_s)),
+            acceleration: SpeedChange::Time(sane_time(self.acceleration_time_s)),
             deceleration_pace: pace(deceleration_time_s, max_speed, end_speed).unwrap_or(stopping_pace),
             stopping_pace,
         };

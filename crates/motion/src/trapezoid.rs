@@ -1,7 +1,7 @@
 //! Profiles of constant acceleration and deceleration, for drives that are given them in units/s² (the M joint
 //! motors' objects 6083h and 6084h in r/min/s).
 
-use crate::profile::{self, MoveLimits, Profile, Ramp, Shape, sane, sane_speed};
+use crate::profile::{self, MoveLimits, Profile, Shape, SpeedChange, sane, sane_speed};
 
 /// Change of velocity from `from` to `to` (units/s) at `acceleration` (units/s²); zero acceleration is a step.
 pub fn velocity_change(from: f64, to: f64, acceleration: f64) -> Profile {
@@ -36,7 +36,7 @@ impl PositionMove {
             start_speed: sane_speed(self.start_speed).min(max_speed),
             max_speed,
             end_speed: sane_speed(self.end_speed).min(max_speed),
-            acceleration: Ramp::Pace(pace(self.acceleration)),
+            acceleration: SpeedChange::Pace(pace(self.acceleration)),
             deceleration_pace: pace(self.deceleration),
             stopping_pace: pace(self.deceleration),
         };

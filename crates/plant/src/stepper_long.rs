@@ -57,7 +57,7 @@ struct Book {
 }
 
 /// How the rotor stands to the field, and the currents in the frame of it.
-struct Held {
+struct FieldFrame {
     ahead: Axis,
     current_a: Dq,
     field_pulses: f64,
@@ -66,7 +66,7 @@ struct Held {
 }
 
 /// One part of the step.
-struct Part {
+struct SubStep {
     periods: u32,
     dt_s: f64,
     /// How far the field turns.
@@ -205,12 +205,12 @@ impl StepperMotor {
 
     /// Rotor and currents seen from where the field stands at the beginning.
     #[inline]
-    fn held(&self, path: &Path, part: u32) -> Held {
+    fn held(&self, path: &Path, part: u32) -> FieldFrame {
         let field_pulses = path.at(0.0, f64::from(part));
         let field = Axis::at_turns(field_pulses * path.pulse_turns);
         let back = Axis { sin: -field.sin, cos: field.cos };
         let [a, b] = self.stepper.current_a;
-        Held {
+        FieldFrame {
             ahead: self.axis.turned_by(back),
             current_a: Dq { d: a * field.cos + b * field.sin, q: b * field.cos - a * field.sin },
             field_pulses,
@@ -220,7 +220,7 @@ impl StepperMotor {
 
     /// The currents as the phases carry them, and the magnets' direction, where the field stands at the end.
     #[inline]
-    fn let_go(&mut self, path: &Path, held: &Held) {
+    fn let_go(&mut self, path: &Path, held: &FieldFrame) {
         let field = held.field.unwrap_or_else(|| Axis::at_turns(held.field_pulses * path.pulse_turns));
         let Dq { d, q } = held.current_a;
         self.stepper.current_a = [d * field.cos - q * field.sin, q * field.cos + d * field.sin];
@@ -230,7 +230,7 @@ impl StepperMotor {
     }
 
     #[inline]
-    fn part(&self, path: &Path, held: &mut Held, done: u32, periods: u32, period_s: f64) -> Part {
+    fn part(&self, path: &Path, held: &mut FieldFrame, done: u32, periods: u32, period_s: f64) -> SubStep {
         let before = held.field_pulses;
         held.field_pulses = path.at(f64::from(done + periods), f64::from(periods));
         let field_turns = (held.field_pulses - before) * path.pulse_turns;
@@ -245,7 +245,7 @@ impl StepperMotor {
             held.field = None;
             None
         };
-        Part { periods, dt_s: f64::from(periods) * period_s, field_turns, field }
+        SubStep { periods, dt_s: f64::from(periods) * period_s, field_turns, field }
     }
 
     /// Currents during a part while the rotor turns at this velocity, from `held` up to its middle: the torque on the rotor, of the
@@ -253,9 +253,9 @@ impl StepperMotor {
     #[inline(always)]
     fn torque_nm(
         &mut self,
-        held: &mut Held,
+        held: &mut FieldFrame,
         book: &mut Book,
-        part: &Part,
+        part: &SubStep,
         (resistance_ohm, limit_v): (f64, f64),
         (to_middle_rad_s, mean_rad_s): (f64, f64),
     ) -> (f64, f64) {
@@ -300,7 +300,7 @@ impl StepperMotor {
 
     /// A part in which the rotor moves on its own.
     #[inline]
-    fn swing_part(&mut self, held: &mut Held, book: &mut Book, part: &Part, input: (f64, f64)) {
+    fn swing_part(&mut self, held: &mut FieldFrame, book: &mut Book, part: &SubStep, input: (f64, f64)) {
         let before_rad_s = if self.rig.load.locked { 0.0 } else { self.rotor.velocity_rad_s };
         // The change is kept as that of a control period, whatever the length of a part.
         let change = f64::from(part.periods) * self.rotor.velocity_change_rad_s;
@@ -340,7 +340,14 @@ impl StepperMotor {
     /// A part in which the rotor turns on as it does, since what moves it comes after.
     #[cold]
     #[inline(never)]
-    fn push_part(&mut self, held: &mut Held, book: &mut Book, part: &Part, input: (f64, f64), velocity_rad_s: f64) {
+    fn push_part(
+        &mut self,
+        held: &mut FieldFrame,
+        book: &mut Book,
+        part: &SubStep,
+        input: (f64, f64),
+        velocity_rad_s: f64,
+    ) {
         let (current_nm, detent_nm) = self.torque_nm(held, book, part, input, (velocity_rad_s, velocity_rad_s));
         let rest_rad =
             0.5 * part.dt_s * f64::from(self.model.stepper.teeth) * velocity_rad_s - 0.5 * part.field_turns * TAU;

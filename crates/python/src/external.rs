@@ -17,7 +17,7 @@ use sim::{CoupledShaft, Coupling, ExternalShaft, Given};
 use crate::failure::{bad_value, refused, wrong_use};
 use crate::world::{Shared, World, WorldState, place_of};
 
-type Row<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+type FloatArray<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 type Rows<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -50,7 +50,7 @@ fn row<'py>(what: &str, values: &Bound<'py, PyAny>) -> PyResult<Vec<f64>> {
     {
         return Ok(row);
     }
-    let array: Row<'py> = values
+    let array: FloatArray<'py> = values
         .extract()
         .map_err(|_| bad_value(format!("{what}: expected an array of numbers with one dimension, got {values}")))?;
     Ok(array.as_array().to_vec())
@@ -152,11 +152,11 @@ pub(crate) fn exchanged<'py>(
 }
 
 /// For each shaft: place, turns, inertia, dry friction, torque, angle, velocity.
-type Shaft = (String, f64, f64, f64, f64, f64, f64);
+type ShaftRow = (String, f64, f64, f64, f64, f64, f64);
 
 /// The shafts that are moved from outside, in the order of the exchange.
 #[pyfunction]
-pub(crate) fn external_shafts(py: Python<'_>, world: &Bound<'_, World>) -> PyResult<Vec<Shaft>> {
+pub(crate) fn external_shafts(py: Python<'_>, world: &Bound<'_, World>) -> PyResult<Vec<ShaftRow>> {
     let shafts = world.get().shared().lock(py)?.world.external_shafts();
     let plain = |ExternalShaft { place, turns, inertia_kg_m2, dry_nm, torque_nm, angle_rad, velocity_rad_s }| {
         (place.to_string(), turns, inertia_kg_m2, dry_nm, torque_nm, angle_rad, velocity_rad_s)

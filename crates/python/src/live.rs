@@ -26,11 +26,11 @@ const MOST_WAITING: usize = 64;
 pub(crate) struct Live {
     jobs: Option<mpsc::UnboundedSender<Job>>,
     thread: Option<JoinHandle<()>>,
-    said: Arc<Said>,
+    said: Arc<ThreadMessages>,
 }
 
 /// What the thread reports of its bus.
-struct Said(Mutex<Words>);
+struct ThreadMessages(Mutex<Words>);
 
 struct Words {
     notes: BusNotes,
@@ -42,7 +42,7 @@ struct Words {
     moving: Vec<String>,
 }
 
-impl Said {
+impl ThreadMessages {
     fn of(spec: &BusSpec) -> Self {
         Self(Mutex::new(Words { notes: BusNotes::of(spec), waiting: VecDeque::new(), ended: None, moving: Vec::new() }))
     }
@@ -72,7 +72,7 @@ impl Live {
     pub(crate) fn open(spec: BusSpec, network: Network, traffic: Traffic, ways_back: WaysBack) -> Result<Self, String> {
         let (jobs, incoming) = mpsc::unbounded_channel();
         let opened = Opened::default();
-        let said = Arc::new(Said::of(&spec));
+        let said = Arc::new(ThreadMessages::of(&spec));
         let (reported, noted) = (Arc::clone(&opened), Arc::clone(&said));
         let thread = thread::Builder::new().name("ferrodrive master".into());
         let thread = thread.spawn(move || run(&spec, (network, traffic, ways_back), incoming, &reported, &noted));
@@ -130,7 +130,7 @@ fn run(
     (network, traffic, ways_back): (Network, Traffic, WaysBack),
     incoming: mpsc::UnboundedReceiver<Job>,
     opened: &Opened,
-    said: &Said,
+    said: &ThreadMessages,
 ) {
     let report = |result: Result<(), String>| {
         *opened.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);

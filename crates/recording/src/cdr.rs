@@ -51,12 +51,12 @@ impl Encoder {
 }
 
 /// A message that is read; `None` where it ends too early, or is of another representation.
-pub(super) struct Decoder<'a> {
+pub(super) struct CdrReader<'a> {
     body: &'a [u8],
     at: usize,
 }
 
-impl<'a> Decoder<'a> {
+impl<'a> CdrReader<'a> {
     pub(super) fn new(message: &'a [u8]) -> Option<Self> {
         message.strip_prefix(&REPRESENTATION).map(|body| Self { body, at: 0 })
     }
@@ -104,18 +104,18 @@ mod tests {
             &[0, 0, 0, 0, 0, 0, 0xF0, 0x3F],
         ];
         assert_eq!(message.bytes(), expected.concat());
-        let mut read = Decoder::new(message.bytes()).expect("the representation");
+        let mut read = CdrReader::new(message.bytes()).expect("the representation");
         assert_eq!((read.u8(), read.u32(), read.text(), read.f64()), (Some(7), Some(1), Some("ab"), Some(1.0)));
         assert_eq!((read.u8(), read.f64()), (None, None));
     }
 
     #[test]
     fn what_is_torn_or_of_another_representation_is_nothing() {
-        assert!(Decoder::new(&[0, 0, 0, 0, 1]).is_none() && Decoder::new(&[]).is_none());
+        assert!(CdrReader::new(&[0, 0, 0, 0, 1]).is_none() && CdrReader::new(&[]).is_none());
         for body in [&[0xFF, 0xFF, 0xFF, 0xFF, 0][..], &[0, 0, 0, 0], &[2, 0, 0, 0, b'a', b'b'], &[2, 0, 0, 0, 0xFF, 0]]
         {
             let message = [&REPRESENTATION[..], body].concat();
-            assert_eq!(Decoder::new(&message).expect("the representation").text(), None, "{body:?}");
+            assert_eq!(CdrReader::new(&message).expect("the representation").text(), None, "{body:?}");
         }
     }
 }

@@ -48,7 +48,7 @@ pub trait Sink {
 /// The channels, and the form of their messages.
 pub struct Channels {
     list: Vec<Channel>,
-    subjects: Vec<Signals>,
+    subjects: Vec<SubjectSignals>,
     /// Columns that have a channel.
     width: usize,
     /// Values are not rounded.
@@ -57,7 +57,7 @@ pub struct Channels {
 }
 
 /// The signals of one subject.
-struct Signals {
+struct SubjectSignals {
     subject: Subject,
     channel: usize,
     /// Place in a row, and how many of its binary digits after the point are kept.
@@ -103,7 +103,7 @@ impl Channels {
             let (places, of_it): (Vec<usize>, Vec<&Column>) = of_it.unzip();
             let bits = of_it.iter().map(|column| column.kept_bits().filter(|_| !self.is_exact));
             let fields = places.iter().map(|place| self.width + place).zip(bits).collect();
-            self.subjects.push(Signals { subject: subject.clone(), channel: self.list.len(), fields });
+            self.subjects.push(SubjectSignals { subject: subject.clone(), channel: self.list.len(), fields });
             let mut channel = channel_of(subject, &of_it);
             // Of "left arm" and "left-arm" the second is "BodyLeftArm2": readers keep the first of a name.
             let is_taken = |name: &String| self.list.iter().any(|other| other.schema_name == *name);
@@ -145,7 +145,7 @@ impl Channels {
 
     fn row<S: Sink>(&mut self, at: Instant, values: &[f64], sink: &mut S) -> Result<(), S::Error> {
         let value = |place: usize| values.get(place).copied().filter(|value| value.is_finite());
-        for Signals { channel, fields, .. } in &self.subjects {
+        for SubjectSignals { channel, fields, .. } in &self.subjects {
             if fields.iter().all(|(place, _)| value(*place).is_none()) {
                 continue;
             }

@@ -7,7 +7,7 @@ use mcap::read::{LinearReader, Options};
 use mcap::records::{Channel, ChunkHeader, Record};
 use serde_json::Value;
 
-use super::cdr::Decoder;
+use super::cdr::CdrReader;
 use super::channels::{EVENTS, MESSAGE_ENCODING, NAMED};
 use super::column::{Column, Subject};
 use super::packing;
@@ -22,7 +22,7 @@ pub(super) fn read_mcap(bytes: &[u8]) -> Result<Recorded, String> {
     }
     let records = LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into())
         .map_err(|error| format!("not an MCAP file: {error}"))?;
-    let mut reading = Reading::default();
+    let mut reading = McapContents::default();
     reading.recorded.torn = !bytes.ends_with(mcap::MAGIC);
     for record in records {
         let whole = match record {
@@ -61,7 +61,7 @@ fn unpacked(header: &ChunkHeader, data: &[u8]) -> Result<Option<Vec<u8>>, String
 
 /// What was read so far.
 #[derive(Default)]
-struct Reading {
+struct McapContents {
     recorded: Recorded,
     schemas: HashMap<u16, Vec<u8>>,
     channels: HashMap<u16, Topic>,
@@ -72,7 +72,7 @@ enum Topic {
     /// What happened.
     Events { is_json: bool },
     /// Signals: the columns of a message, in its order.
-    Signals { fields: Vec<Field> },
+    Signals { fields: Vec<SignalField> },
     /// Signals of another program, or of a record of before: JSON, with a JSON schema.
     Json { subject: Subject, schema: Value, places: HashMap<String, usize> },
     /// Anything else.
@@ -80,12 +80,12 @@ enum Topic {
 }
 
 /// A field of a message, and where its signal stands in the record.
-struct Field {
+struct SignalField {
     column: Column,
     place: Option<usize>,
 }
 
-impl Reading {
+impl McapContents {
     /// Nothing for a message whose channel is not known.
     fn take(&mut self, record: Record<'_>) -> Option<()> {
         match record {
@@ -141,8 +141,8 @@ impl Topic {
                 recorded.marks.push(mark_of_json(at, &serde_json::from_slice(data).ok()?))
             }
             Self::Signals { fields } => {
-                let mut data = Decoder::new(data)?;
-                for Field { column, place } in fields {
+                let mut data = CdrReader::new(data)?;
+                for SignalField { column, place } in fields {
                     push(place, &|| column.clone(), data.f64()?);
                 }
             }
@@ -172,19 +172,19 @@ impl Topic {
 }
 
 /// The signals of a schema; `None` if it has anything but numbers of the one kind that is written.
-fn fields_of(subject: &Subject, schema: &[u8]) -> Option<Vec<Field>> {
+fn fields_of(subject: &Subject, schema: &[u8]) -> Option<Vec<SignalField>> {
     let field = |line: &str| {
         let (field, comment) = line.split_once("  # ").unwrap_or((line, ""));
         let name = field.strip_prefix("float64 ")?;
         let (unit, signal) = comment.split_once(NAMED).unwrap_or((comment, name));
         let (signal, unit) = (signal.to_owned().into(), unit.to_owned().into());
-        Some(Field { column: Column { subject: subject.clone(), signal, unit }, place: None })
+        Some(SignalField { column: Column { subject: subject.clone(), signal, unit }, place: None })
     };
     std::str::from_utf8(schema).ok()?.lines().map(field).collect()
 }
 
 fn mark_of_cdr(at: Instant, data: &[u8]) -> Option<Mark> {
-    let mut data = Decoder::new(data)?;
+    let mut data = CdrReader::new(data)?;
     // The time is that of the message.
     let (_, _, level) = (data.u32()?, data.u32()?, data.u8()?);
     let (text, of, _, _) = (data.text()?.to_owned(), data.text()?.to_owned(), data.text()?, data.u32()?);

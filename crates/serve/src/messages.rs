@@ -18,7 +18,7 @@ const MAX_BYTES: usize = 4 << 20;
 
 /// Speaks to one stream. A copy speaks to the same.
 #[derive(Clone)]
-pub struct Messages(Arc<Shared>);
+pub struct Messages(Arc<MessageQueue>);
 
 /// What replaces answers that were not read in time.
 #[derive(Serialize)]
@@ -28,7 +28,7 @@ struct Gap {
     dropped: u64,
 }
 
-struct Shared {
+struct MessageQueue {
     queue: Mutex<Queue>,
     changed: Condvar,
     /// The line that stands for as many dropped ones.
@@ -82,7 +82,7 @@ impl Messages {
     }
 
     fn start(stream: impl Write + Send + 'static, gap: fn(u64) -> String, warned: Option<Self>) -> Self {
-        let shared = Arc::new(Shared { queue: Mutex::default(), changed: Condvar::new(), gap, warned });
+        let shared = Arc::new(MessageQueue { queue: Mutex::default(), changed: Condvar::new(), gap, warned });
         let served = Arc::clone(&shared);
         std::thread::spawn(move || served.write_all(stream));
         Self(shared)
@@ -131,7 +131,7 @@ impl Queue {
     }
 }
 
-impl Shared {
+impl MessageQueue {
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }

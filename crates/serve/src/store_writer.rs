@@ -19,19 +19,19 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
 /// See the [module](self).
 pub struct StoreWriter {
-    shared: Arc<Shared>,
+    shared: Arc<WriterQueue>,
     /// How the last attempts went, when it is over.
     outcome: Receiver<Result<(), EepromError>>,
 }
 
 #[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
+struct WriterQueue {
+    state: Mutex<WriterState>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct State {
+struct WriterState {
     /// To be written, by drive number.
     waiting: BTreeMap<u8, StoredImage>,
     /// Written, or reported as unwritable: drive number and which store.
@@ -42,7 +42,7 @@ struct State {
 impl StoreWriter {
     /// Writes to `eeproms` from now on. `settled` is called when there is something for [`take_settled`](Self::take_settled).
     pub fn start(eeproms: Eeproms, messages: Messages, settled: impl Fn() + Send + 'static) -> Self {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(WriterQueue::default());
         let (done, outcome) = channel();
         let served = Arc::clone(&shared);
         std::thread::spawn(move || done.send(served.write_all(&eeproms, &messages, settled)));
@@ -52,7 +52,7 @@ impl StoreWriter {
     /// One whose disk is the holder of the other value, which gets what is kept, by drive number and store.
     #[cfg(test)]
     pub fn by_hand() -> (Self, impl Fn(u8, u64)) {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(WriterQueue::default());
         let (_, outcome) = channel();
         let held = Arc::clone(&shared);
         (Self { shared, outcome }, move |number, generation| held.lock().settled.push((number, generation)))
@@ -83,8 +83,8 @@ pub fn file_name(model: &str, number: u8) -> String {
     format!("{model}@{number}")
 }
 
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
+impl WriterQueue {
+    fn lock(&self) -> MutexGuard<'_, WriterState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -132,7 +132,7 @@ impl Shared {
             let waited = self.changed.wait_timeout_while(state, RETRY_INTERVAL, |state| !state.over);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        let idle = |state: &mut State| state.waiting.is_empty() && !state.over;
+        let idle = |state: &mut WriterState| state.waiting.is_empty() && !state.over;
         state = self.changed.wait_while(state, idle).unwrap_or_else(PoisonError::into_inner);
         let images = std::mem::take(&mut state.waiting);
         (!images.is_empty()).then_some(images)

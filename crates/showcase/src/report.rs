@@ -21,13 +21,13 @@ pub struct Report {
     pub took_s: f64,
     /// Where the picture is.
     pub svg: String,
-    drives: Vec<Summary>,
+    drives: Vec<PartSummary>,
     rows: Vec<Row>,
 }
 
 /// The figures of a part.
 #[derive(Clone, Debug, Serialize)]
-struct Summary {
+struct PartSummary {
     /// The drive, or what the drives do together.
     drive: &'static str,
     steps: usize,
@@ -35,7 +35,7 @@ struct Summary {
     virtual_s: f64,
 }
 
-impl Summary {
+impl PartSummary {
     fn of(part: &PartReport) -> Self {
         Self { drive: part.name, steps: part.steps, passed: part.passed, virtual_s: part.virtual_s }
     }
@@ -48,9 +48,9 @@ impl Summary {
 impl Report {
     /// The report of these parts; `svg` is where the picture is, `took_s` the time that all took.
     pub fn new(parts: Vec<PartReport>, svg: String, took_s: f64) -> Self {
-        let drives: Vec<Summary> = parts.iter().map(Summary::of).collect();
+        let drives: Vec<PartSummary> = parts.iter().map(PartSummary::of).collect();
         Self {
-            ok: drives.iter().all(Summary::ok),
+            ok: drives.iter().all(PartSummary::ok),
             steps: drives.iter().map(|part| part.steps).sum(),
             passed: drives.iter().map(|part| part.passed).sum(),
             virtual_s: drives.iter().map(|part| part.virtual_s).sum(),

@@ -37,7 +37,7 @@ use crate::stimulus::Place;
 use crate::wire::{Bus, ControllerOptions};
 use crate::{Prng, VirtualDrive, seeds};
 use body::CoupledBody;
-use crew::{Crew, Found};
+use crew::{Crew, JobResult};
 use due::DueTimes;
 use ledger::Ledger;
 use member::{Member, Vacant};
@@ -70,7 +70,7 @@ pub struct World {
     mounted: Vec<(usize, Place)>,
     crew: Crew,
     /// Stations that the crew has done its last job with, and what they want.
-    done_ahead: Vec<(usize, Found)>,
+    done_ahead: Vec<(usize, JobResult)>,
 }
 
 /// Names one station of one world: what `add_*` returned.

@@ -57,7 +57,7 @@ pub enum OpenError {
 
 /// What is awaited of the adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum OpeningPhase {
     /// The answer to V, behind those of the lines before it; then the bit rate is selected.
     Clearing,
     /// The answer to S.
@@ -94,7 +94,7 @@ enum Question {
 pub struct Client {
     /// The digit behind `S`.
     code: Option<u8>,
-    phase: Phase,
+    phase: OpeningPhase,
     /// When the present phase, or what is awaited in it, ends without an answer.
     deadline: Instant,
     /// The adapter has answered one of the commands.
@@ -116,7 +116,7 @@ impl Client {
         };
         let mut client = Self {
             code,
-            phase: Phase::Clearing,
+            phase: OpeningPhase::Clearing,
             deadline: now + PATIENCE,
             has_answered: false,
             version: None,
@@ -148,7 +148,7 @@ impl Client {
         while let Some(line) = self.decoder.next(&mut input) {
             self.lines += 1;
             match self.phase {
-                Phase::Open(polling) => self.handle_line(line, polling, now),
+                OpeningPhase::Open(polling) => self.handle_line(line, polling, now),
                 _ => self.handle_opening(line, now),
             }
         }
@@ -157,14 +157,14 @@ impl Client {
     /// Time has reached `now`.
     pub fn handle_timeout(&mut self, now: Instant) {
         match self.phase {
-            Phase::Failed | Phase::Open(Polling::Never) => {}
+            OpeningPhase::Failed | OpeningPhase::Open(Polling::Never) => {}
             _ if now < self.deadline => {}
-            Phase::Clearing | Phase::Selecting | Phase::Opening => self.next_phase(now),
-            Phase::Open(Polling::First) => self.has_no_flags(now),
-            Phase::Open(Polling::Due(question)) => self.ask(question, 0, now),
-            Phase::Open(Polling::Asked(question, tries)) if tries < TRIES => self.ask(question, tries, now),
-            Phase::Open(Polling::Asked(..)) => {
-                self.phase = Phase::Failed;
+            OpeningPhase::Clearing | OpeningPhase::Selecting | OpeningPhase::Opening => self.next_phase(now),
+            OpeningPhase::Open(Polling::First) => self.has_no_flags(now),
+            OpeningPhase::Open(Polling::Due(question)) => self.ask(question, 0, now),
+            OpeningPhase::Open(Polling::Asked(question, tries)) if tries < TRIES => self.ask(question, tries, now),
+            OpeningPhase::Open(Polling::Asked(..)) => {
+                self.phase = OpeningPhase::Failed;
                 self.events.push_back(Event::Silent);
             }
         }
@@ -173,7 +173,7 @@ impl Client {
     /// When [`handle_timeout`](Self::handle_timeout) is to be called next.
     pub const fn poll_timeout(&self) -> Option<Instant> {
         match self.phase {
-            Phase::Failed | Phase::Open(Polling::Never) => None,
+            OpeningPhase::Failed | OpeningPhase::Open(Polling::Never) => None,
             _ => Some(self.deadline),
         }
     }
@@ -200,15 +200,15 @@ impl Client {
 
     fn handle_opening(&mut self, line: Result<Answer, Malformed>, now: Instant) {
         let is_awaited = match (self.phase, &line) {
-            (Phase::Clearing, line) => {
+            (OpeningPhase::Clearing, line) => {
                 self.version = version_in(line);
                 self.version.is_some()
             }
-            (Phase::Selecting | Phase::Opening, Ok(Answer::Done)) => true,
-            (Phase::Selecting, Ok(Answer::Refused)) => {
+            (OpeningPhase::Selecting | OpeningPhase::Opening, Ok(Answer::Done)) => true,
+            (OpeningPhase::Selecting, Ok(Answer::Refused)) => {
                 return self.fail(OpenError::BitrateRefused(self.code.unwrap_or_default()));
             }
-            (Phase::Opening, Ok(Answer::Refused)) => return self.fail(OpenError::OpenRefused),
+            (OpeningPhase::Opening, Ok(Answer::Refused)) => return self.fail(OpenError::OpenRefused),
             _ => false,
         };
         if is_awaited {
@@ -221,16 +221,16 @@ impl Client {
     fn next_phase(&mut self, now: Instant) {
         self.deadline = now + PATIENCE;
         match (self.phase, self.code) {
-            (Phase::Clearing, Some(code)) => {
-                self.phase = Phase::Selecting;
+            (OpeningPhase::Clearing, Some(code)) => {
+                self.phase = OpeningPhase::Selecting;
                 Command::SetBitrate(code).emit(&mut self.output);
             }
-            (Phase::Clearing, None) | (Phase::Selecting, _) => {
-                self.phase = Phase::Opening;
+            (OpeningPhase::Clearing, None) | (OpeningPhase::Selecting, _) => {
+                self.phase = OpeningPhase::Opening;
                 Command::Open.emit(&mut self.output);
             }
-            (Phase::Opening, _) if self.has_answered => {
-                self.phase = Phase::Open(Polling::First);
+            (OpeningPhase::Opening, _) if self.has_answered => {
+                self.phase = OpeningPhase::Open(Polling::First);
                 self.lines = 0;
                 Command::Status.emit(&mut self.output);
                 self.events.push_back(Event::Opened);
@@ -240,13 +240,13 @@ impl Client {
     }
 
     fn fail(&mut self, error: OpenError) {
-        self.phase = Phase::Failed;
+        self.phase = OpeningPhase::Failed;
         self.events.push_back(Event::Failed(error));
     }
 
     /// Asks an open adapter, which has been asked so often since it last said anything.
     fn ask(&mut self, question: Question, tries: u8, now: Instant) {
-        self.phase = Phase::Open(Polling::Asked(question, tries + 1));
+        self.phase = OpeningPhase::Open(Polling::Asked(question, tries + 1));
         self.deadline = now + SILENCE;
         let command = match question {
             Question::Status => Command::Status,
@@ -257,21 +257,21 @@ impl Client {
 
     /// It answers with this: it is asked again in a while.
     fn answers(&mut self, question: Question, now: Instant) {
-        self.phase = Phase::Open(Polling::Due(question));
+        self.phase = OpeningPhase::Open(Polling::Due(question));
         self.deadline = now + ASKED_EVERY;
     }
 
     fn has_no_flags(&mut self, now: Instant) {
         match self.version {
             Some(_) => self.answers(Question::Version, now),
-            None => self.phase = Phase::Open(Polling::Never),
+            None => self.phase = OpeningPhase::Open(Polling::Never),
         }
     }
 
     fn handle_line(&mut self, line: Result<Answer, Malformed>, polling: Polling, now: Instant) {
         if let Polling::Asked(question, _) = polling {
             // Whatever it says, it is there.
-            self.phase = Phase::Open(Polling::Asked(question, 0));
+            self.phase = OpeningPhase::Open(Polling::Asked(question, 0));
         }
         if self.version.is_some() && version_in(&line) == self.version {
             return self.answers(Question::Version, now);

@@ -20,19 +20,19 @@ const WORD: &str = "page";
 /// Messages of the page that wait: each is taken when it comes.
 const WAITING: usize = 64;
 
-type Work = Task<Pin<Box<dyn Future<Output = ()>>>>;
+type PageTask = Task<Pin<Box<dyn Future<Output = ()>>>>;
 
 /// See the [module](self).
 pub(crate) struct Hosted {
     handle: HostHandle,
-    hosting: Work,
+    hosting: PageTask,
     conversation: Option<Conversation>,
     sent: Vec<String>,
 }
 
 /// The session of the page.
 struct Conversation {
-    work: Work,
+    work: PageTask,
     said: mpsc::Sender<Said>,
     sending: mpsc::Receiver<String>,
 }

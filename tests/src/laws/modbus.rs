@@ -29,8 +29,8 @@ pub(super) fn modbus(data: &[u8]) {
 }
 
 fn over_tcp(bytes: &[u8], cut: usize) {
-    let whole = Server::new(ModbusMedium::Tcp).heard(bytes, bytes.len().max(1));
-    assert_eq!(whole, Server::new(ModbusMedium::Tcp).heard(bytes, cut), "{bytes:02X?} cut to {cut}");
+    let whole = ServerUnderTest::new(ModbusMedium::Tcp).heard(bytes, bytes.len().max(1));
+    assert_eq!(whole, ServerUnderTest::new(ModbusMedium::Tcp).heard(bytes, cut), "{bytes:02X?} cut to {cut}");
     let mut rest = &whole[..];
     while let Some((head, after)) = rest.split_first_chunk::<6>() {
         let length = usize::from(head[4]) << 8 | usize::from(head[5]);
@@ -42,9 +42,9 @@ fn over_tcp(bytes: &[u8], cut: usize) {
 }
 
 fn on_a_line(bytes: &[u8], cut: usize) {
-    let mut server = Server::new(ModbusMedium::SerialLine);
+    let mut server = ServerUnderTest::new(ModbusMedium::SerialLine);
     let heard = server.heard(bytes, cut);
-    assert_eq!(heard, Server::new(ModbusMedium::SerialLine).heard(bytes, bytes.len().max(1)), "{bytes:02X?}");
+    assert_eq!(heard, ServerUnderTest::new(ModbusMedium::SerialLine).heard(bytes, bytes.len().max(1)), "{bytes:02X?}");
     let mut silences = 0;
     while server.session.awaits_silence() {
         server.session.handle_silence();
@@ -62,7 +62,7 @@ fn as_a_request(pdu: &[u8]) {
     if !(1..=253).contains(&pdu.len()) {
         return;
     }
-    let mut server = Server::new(ModbusMedium::Tcp);
+    let mut server = ServerUnderTest::new(ModbusMedium::Tcp);
     let answer = server.heard(&[&[1, 2, 0, 0, 0, 1 + pdu.len() as u8, UNIT], pdu].concat(), 300);
     if pdu[0] < 0x80 {
         assert!(answer.len() > 8 && answer[..4] == [1, 2, 0, 0] && answer[7] & 0x7F == pdu[0], "{pdu:02X?}");
@@ -87,13 +87,13 @@ fn judge(pdu: &[u8]) {
 }
 
 /// A session and the registers behind it.
-struct Server {
+struct ServerUnderTest {
     session: ModbusSession,
     registers: [u16; REGISTERS],
     out: Vec<u8>,
 }
 
-impl Server {
+impl ServerUnderTest {
     fn new(medium: ModbusMedium) -> Self {
         Self { session: ModbusSession::new(medium), registers: [0; REGISTERS], out: Vec::new() }
     }

@@ -12,11 +12,11 @@ const HIGHEST_BIT: u8 = 31;
 #[derive(Clone, Debug)]
 pub struct FastScan {
     address: Address,
-    step: Step,
+    step: ScanStep,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
+enum ScanStep {
     Presence,
     Bit {
         part: u8,
@@ -40,42 +40,42 @@ impl Default for FastScan {
 impl FastScan {
     /// A search that begins.
     pub const fn new() -> Self {
-        Self { address: Address { numbers: [0; 4] }, step: Step::Presence }
+        Self { address: Address { numbers: [0; 4] }, step: ScanStep::Presence }
     }
 
     /// The next question; `None` once it is over.
     pub fn next(&self) -> Option<Request> {
         let number = |part: u8| self.address.numbers[usize::from(part & 3)];
         match self.step {
-            Step::Presence => Some(Request::FastScan { number: 0, bit: PRESENCE, part: 0, next: 0 }),
-            Step::Bit { part, bit } => Some(Request::FastScan { number: number(part), bit, part, next: part }),
-            Step::Confirm { part } => {
+            ScanStep::Presence => Some(Request::FastScan { number: 0, bit: PRESENCE, part: 0, next: 0 }),
+            ScanStep::Bit { part, bit } => Some(Request::FastScan { number: number(part), bit, part, next: part }),
+            ScanStep::Confirm { part } => {
                 Some(Request::FastScan { number: number(part), bit: 0, part, next: (part + 1) & 3 })
             }
-            Step::Found | Step::Unanswered => None,
+            ScanStep::Found | ScanStep::Unanswered => None,
         }
     }
 
     /// Whether a slave has answered.
     pub fn note(&mut self, identified: bool) {
         self.step = match self.step {
-            Step::Presence if identified => Step::Bit { part: 0, bit: HIGHEST_BIT },
-            Step::Bit { part, bit } => {
+            ScanStep::Presence if identified => ScanStep::Bit { part: 0, bit: HIGHEST_BIT },
+            ScanStep::Bit { part, bit } => {
                 if !identified {
                     // No slave has 0 there, so all that are there have 1.
                     self.address.numbers[usize::from(part & 3)] |= 1 << bit;
                 }
-                if bit > 0 { Step::Bit { part, bit: bit - 1 } } else { Step::Confirm { part } }
+                if bit > 0 { ScanStep::Bit { part, bit: bit - 1 } } else { ScanStep::Confirm { part } }
             }
-            Step::Confirm { part: 3 } if identified => Step::Found,
-            Step::Confirm { part } if identified => Step::Bit { part: part + 1, bit: HIGHEST_BIT },
-            Step::Presence | Step::Confirm { .. } | Step::Unanswered => Step::Unanswered,
-            Step::Found => Step::Found,
+            ScanStep::Confirm { part: 3 } if identified => ScanStep::Found,
+            ScanStep::Confirm { part } if identified => ScanStep::Bit { part: part + 1, bit: HIGHEST_BIT },
+            ScanStep::Presence | ScanStep::Confirm { .. } | ScanStep::Unanswered => ScanStep::Unanswered,
+            ScanStep::Found => ScanStep::Found,
         };
     }
 
     /// The address, once it is found. That device lets itself be configured from then on.
     pub fn found(&self) -> Option<Address> {
-        (self.step == Step::Found).then_some(self.address)
+        (self.step == ScanStep::Found).then_some(self.address)
     }
 }

@@ -51,9 +51,9 @@ impl fmt::Display for Outcome {
 }
 
 /// A node-ID as LSS gives it.
-struct Node(u8);
+struct NodeWord(u8);
 
-impl fmt::Display for Node {
+impl fmt::Display for NodeWord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             UNCONFIGURED => f.write_str("no node-ID"),
@@ -70,7 +70,7 @@ impl fmt::Display for Request {
             Self::SwitchGlobal(true) => f.write_str("switch state global: configuration"),
             Self::SwitchGlobal(false) => f.write_str("switch state global: waiting"),
             Self::SwitchSelective(part, number) => write!(f, "switch state selective: {part} {number:X}h"),
-            Self::ConfigureNodeId(node) => write!(f, "configure {}", Node(node)),
+            Self::ConfigureNodeId(node) => write!(f, "configure {}", NodeWord(node)),
             Self::ConfigureBitRate { table: 0, index } => {
                 match BIT_RATES_KBIT.get(usize::from(index)).copied().flatten() {
                     Some(rate) => write!(f, "configure bit rate {rate} kbit/s"),
@@ -110,7 +110,7 @@ impl fmt::Display for Reply {
             Self::BitRateConfigured(outcome) => write!(f, "bit rate: {outcome}"),
             Self::Stored(outcome) => write!(f, "store: {outcome}"),
             Self::Number(part, number) => write!(f, "{part} {number:X}h"),
-            Self::NodeId(node) => write!(f, "{}", Node(node)),
+            Self::NodeId(node) => write!(f, "{}", NodeWord(node)),
             Self::Identified => f.write_str("identified"),
             Self::NonConfigured => f.write_str("a device without a node-ID"),
             Self::Unknown(specifier) => write!(f, "command specifier {specifier:02X}h"),

@@ -8,7 +8,7 @@ use crate::sdo::{Server, parameter};
 
 /// The record of one server, and what it does.
 #[derive(Clone)]
-pub(super) struct Channel {
+pub(super) struct SdoChannel {
     pub(super) index: u16,
     /// What its client sends to; `None` for one that does not exist.
     pub(super) request: Option<u16>,
@@ -20,9 +20,9 @@ pub(super) struct Channel {
 }
 
 /// As many as the table has records for, none of them valid. `server` is one with nothing under way.
-pub(super) fn of<S: Storage>(table: &Table, server: &Server) -> S::Channels<Channel> {
+pub(super) fn of<S: Storage>(table: &Table, server: &Server) -> S::Channels<SdoChannel> {
     let (reply, asked) = (CanId::standard(0), Ticket(0));
-    let empty = Channel { index: 0, request: None, reply, server: server.clone(), asked };
+    let empty = SdoChannel { index: 0, request: None, reply, server: server.clone(), asked };
     let mut channels = S::channels(table.channel_count(), empty);
     let records = table.rows().iter().filter(|row| parameter::is_further_server(row.index) && row.sub_index == 1);
     for (channel, (number, row)) in channels.as_mut().iter_mut().zip((1..).zip(records)) {
@@ -31,7 +31,7 @@ pub(super) fn of<S: Storage>(table: &Table, server: &Server) -> S::Channels<Chan
     channels
 }
 
-impl Channel {
+impl SdoChannel {
     pub(super) fn has_frame(&self) -> bool {
         self.server.has_reply() || self.server.has_segment()
     }

@@ -4,7 +4,7 @@
 use can::{Frame, Instant};
 
 use super::Node;
-use super::channel::Channel;
+use super::channel::SdoChannel;
 use super::event::Ticket;
 use super::pending::Source;
 use crate::od::Storage;
@@ -90,7 +90,7 @@ impl<S: Storage> Node<S> {
     }
 
     pub(super) fn offer_channels(&mut self) {
-        self.pending.set(Source::Channel, self.channels.as_ref().iter().any(Channel::has_frame));
+        self.pending.set(Source::Channel, self.channels.as_ref().iter().any(SdoChannel::has_frame));
     }
 
     pub(super) fn serve_channel_deadlines(&mut self) {

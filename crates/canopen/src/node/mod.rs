@@ -52,7 +52,7 @@ mod transmit;
 
 use can::{CanId, Frame, Instant, Station};
 
-use channel::Channel;
+use channel::SdoChannel;
 pub use client::SdoClient;
 use event::EventQueue;
 pub use event::{NodeEvent, Ticket, Via};
@@ -97,7 +97,7 @@ pub struct Node<S: Storage> {
     sdo: Server,
     /// The latest question to the owner for the client of this server.
     asked: Ticket,
-    channels: S::Channels<Channel>,
+    channels: S::Channels<SdoChannel>,
     sync: NodeSync,
     /// The latest question to the owner for any client.
     ticket: Ticket,

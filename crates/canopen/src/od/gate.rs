@@ -1,4 +1,4 @@
-use super::{Entry, Summary};
+use super::{AccessBits, Entry};
 
 /// What a written value has to pass, resolved from the row at compile time: one subtraction, one comparison and one bit,
 /// whatever the row's type, limits and list are.
@@ -29,7 +29,7 @@ impl Gate {
     pub(super) const fn of(row: &Entry) -> Self {
         let mask = row.data_type.mask();
         let is_cell = row.data_type.is_integer() && row.data_type.fits_cell();
-        if !Summary::of(row).is_writable() || !is_cell {
+        if !AccessBits::of(row).is_writable() || !is_cell {
             return Self { mask, ..Self::CLOSED };
         }
         let (mut low, mut high) = row.data_type.range();

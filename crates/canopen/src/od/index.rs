@@ -1,6 +1,6 @@
 //! What makes a search among rows fast: a hash directory from a key to its row, and of each row what requests must know.
 
-use super::{Entry, Gate, MAX_ROWS, Summary, TableError};
+use super::{AccessBits, Entry, Gate, MAX_ROWS, TableError};
 
 /// A free place of the directory.
 pub(super) const FREE: u16 = u16::MAX;
@@ -10,12 +10,12 @@ pub(super) const FREE: u16 = u16::MAX;
 pub struct RowFacts {
     pub(super) key: u32,
     pub(super) gate: Gate,
-    pub(crate) summary: Summary,
+    pub(crate) summary: AccessBits,
 }
 
 impl RowFacts {
     /// Of no row.
-    pub const NONE: Self = Self { key: 0, gate: Gate::CLOSED, summary: Summary::NONE };
+    pub const NONE: Self = Self { key: 0, gate: Gate::CLOSED, summary: AccessBits::NONE };
 }
 
 /// Two places of the directory: it has twice as many places as there are rows, so that searches end soon.
@@ -101,7 +101,7 @@ pub(super) const fn fill(
         if !follows || (position >= base && has(facts, places, key)) {
             return Err(TableError::NotAscending { position });
         }
-        let summary = Summary::of(row);
+        let summary = AccessBits::of(row);
         let mut gate = Gate::of(row);
         if summary.is_long() {
             let capacity = row.stored_bytes();

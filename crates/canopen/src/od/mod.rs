@@ -33,7 +33,7 @@ use gate::Gate;
 pub use index::{FREE_PLACES, Index, Places, RowFacts};
 pub use slot::{MAX_ROWS, Slot};
 pub use storage::{Fixed, Storage};
-pub(crate) use summary::Summary;
+pub(crate) use summary::AccessBits;
 pub use table::{Object, Table};
 pub use table_error::TableError;
 pub use value::{MAX_NUMBER, Value};

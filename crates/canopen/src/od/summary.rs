@@ -3,7 +3,7 @@ use super::Entry;
 /// What every request must know of a row, in one byte: an upload needs no more of it, a download its [`Gate`](super::Gate)
 /// too. Rows are wide; the summaries of a whole table take a few cache lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Summary(u8);
+pub(crate) struct AccessBits(u8);
 
 /// Bytes of a cell that the type leaves zero.
 const UNUSED_BYTES: u8 = 0b11;
@@ -12,7 +12,7 @@ const READABLE: u8 = 1 << 3;
 const WRITABLE: u8 = 1 << 4;
 const COMMUNICATION: u8 = 1 << 5;
 
-impl Summary {
+impl AccessBits {
     /// Of no row: nothing is allowed.
     pub(super) const NONE: Self = Self(0);
 
@@ -94,7 +94,7 @@ mod tests {
         for data_type in [DataType::Integer8, DataType::Unsigned16, DataType::Integer32] {
             for access in [Access::ReadOnly, Access::WriteOnly, Access::ReadWrite, Access::Const] {
                 let row = Entry::new(0x2000, 0, data_type, access, "", "");
-                let summary = Summary::of(&row);
+                let summary = AccessBits::of(&row);
                 assert_eq!(usize::from(summary.size()), data_type.size());
                 assert_eq!(summary.is_readable(), access.is_readable());
                 assert_eq!(summary.is_writable(), access.is_writable());
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_constant_text_is_readable_only() {
-        let summary = Summary::of(&Entry::new(0x1008, 0, DataType::VisibleString, Access::ReadWrite, "", ""));
+        let summary = AccessBits::of(&Entry::new(0x1008, 0, DataType::VisibleString, Access::ReadWrite, "", ""));
         assert!(summary.is_long() && summary.is_communication() && summary.is_readable());
         assert!(!summary.is_writable());
     }

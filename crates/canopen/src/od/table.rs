@@ -1,7 +1,7 @@
 use core::marker::PhantomData;
 
 use super::index::{FREE, Room, fill, first_place, next_place};
-use super::{Entry, Gate, Held, Index, Places, RowFacts, Slot, Summary, TableError};
+use super::{AccessBits, Entry, Gate, Held, Index, Places, RowFacts, Slot, TableError};
 use crate::{AbortCode, Mux};
 
 /// All rows of a device, with what makes the search among them fast. They lie in the order of their [`Slot`]s, which is that of
@@ -157,7 +157,7 @@ impl Table {
 
     /// The row of a slot of this table in short.
     #[inline]
-    pub(crate) const fn summary(&self, slot: Slot) -> Summary {
+    pub(crate) const fn summary(&self, slot: Slot) -> AccessBits {
         self.facts[slot.position()].summary
     }
 

@@ -111,14 +111,14 @@ impl MappingRecord {
 /// The objects of a PDO in order, as rows and places in its 64 bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapping {
-    objects: Objects,
+    objects: MappedObjects,
     count: u8,
     /// In bytes.
     length: u8,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Objects {
+enum MappedObjects {
     /// Each is a cell that stands in the PDO as it is: shifts are all that is left to do. Of one byte at least, so they are
     /// eight at most.
     Plain([Plain; MAX_PLAIN]),
@@ -209,8 +209,11 @@ impl Mapping {
         if used == 0 {
             return Ok(None);
         }
-        let objects =
-            if plain { Objects::plain(values, &objects[..mapped]) } else { Objects::AtTheBit(objects, forms) };
+        let objects = if plain {
+            MappedObjects::plain(values, &objects[..mapped])
+        } else {
+            MappedObjects::AtTheBit(objects, forms)
+        };
         Ok(Some(Self { objects, count: mapped as u8, length: used.div_ceil(8) }))
     }
 
@@ -218,16 +221,16 @@ impl Mapping {
     #[inline(always)]
     pub(crate) fn plain_objects(&self) -> Option<&[Plain]> {
         match &self.objects {
-            Objects::Plain(objects) => Some(&objects[..usize::from(self.count)]),
-            Objects::AtTheBit(..) => None,
+            MappedObjects::Plain(objects) => Some(&objects[..usize::from(self.count)]),
+            MappedObjects::AtTheBit(..) => None,
         }
     }
 
     /// The mapped objects, if they are not all [plain](Self::plain_objects).
     pub(crate) fn objects_at_the_bit(&self) -> &[Mapped] {
         match &self.objects {
-            Objects::Plain(_) => &[],
-            Objects::AtTheBit(objects, _) => &objects[..usize::from(self.count)],
+            MappedObjects::Plain(_) => &[],
+            MappedObjects::AtTheBit(objects, _) => &objects[..usize::from(self.count)],
         }
     }
 
@@ -247,13 +250,13 @@ impl Mapping {
     #[inline(never)]
     fn gather_at_the_bit<S: Storage>(&self, values: &Dictionary<S>) -> u64 {
         let values = values.view();
-        let Objects::AtTheBit(_, forms) = &self.objects else { return 0 };
+        let MappedObjects::AtTheBit(_, forms) = &self.objects else { return 0 };
         let objects = self.objects_at_the_bit().iter();
         objects.fold(0, |data, object| data | (object.sample(&values, forms) & object.mask()) << object.shift)
     }
 }
 
-impl Objects {
+impl MappedObjects {
     fn plain<S: Storage>(values: &Dictionary<S>, mapped: &[Mapped]) -> Self {
         let mut plain = [Plain { write: ResolvedWrite::NONE, shift: 0 }; MAX_PLAIN];
         for (to, from) in plain.iter_mut().zip(mapped) {

@@ -66,7 +66,7 @@ enum Transfer {
     None,
     Upload {
         mux: Mux,
-        source: Source,
+        source: UploadSource,
         sent: usize,
         toggle: bool,
     },
@@ -81,9 +81,9 @@ enum Transfer {
     },
     BlockUpload {
         mux: Mux,
-        source: Source,
+        source: UploadSource,
         sender: Sender,
-        phase: Phase,
+        phase: BlockUploadPhase,
     },
     BlockDownload {
         mux: Mux,
@@ -101,7 +101,7 @@ enum Transfer {
 }
 
 /// What becomes of a frame in a download of blocks.
-enum Taken {
+enum SubBlockFrame {
     /// It is a part of it; perhaps its end.
     Here(Option<Write>),
     /// It is another request, and the download is over.
@@ -110,7 +110,7 @@ enum Taken {
 
 /// How far the upload of blocks is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
+enum BlockUploadPhase {
     /// The client has not started it yet.
     Agreed,
     /// Segments are sent, or a confirmation is waited for.
@@ -121,7 +121,7 @@ enum Phase {
 
 /// What an upload sends.
 #[derive(Clone, Copy, Debug)]
-enum Source {
+enum UploadSource {
     Constant(&'static [u8]),
     /// A cell, this many bytes of it.
     Cell([u8; MAX_EXPEDITED], u8),
@@ -177,7 +177,7 @@ impl Server {
             return None;
         }
         if self.takes_segments
-            && let Taken::Here(write) = self.take_in_download(frame, values, now)
+            && let SubBlockFrame::Here(write) = self.take_in_download(frame, values, now)
         {
             return write;
         }
@@ -321,7 +321,7 @@ impl Server {
         if !facts.summary.is_readable() {
             return self.refuse(mux, AbortCode::WRITE_ONLY);
         }
-        let source = Source::of_long(self.number, slot, values);
+        let source = UploadSource::of_long(self.number, slot, values);
         let view = values.view();
         let data = source.bytes(self.number, &view);
         if let Some(payload) = Payload::expedited(data) {
@@ -551,7 +551,7 @@ impl Server {
     }
 }
 
-impl Source {
+impl UploadSource {
     /// Of a value that is longer than a cell.
     fn of_long<S: Storage>(server: u8, slot: Slot, values: &mut Dictionary<S>) -> Self {
         match values.table().row(slot).constant_bytes() {

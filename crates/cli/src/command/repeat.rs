@@ -49,14 +49,14 @@ impl Repeat {
 }
 
 /// Due times with equal distances.
-pub(crate) struct Pace {
+pub(crate) struct Ticker {
     network: Network,
     begin: Instant,
     every: Duration,
     next: u64,
 }
 
-impl Pace {
+impl Ticker {
     /// From now on, the first time at once.
     pub(crate) fn new(network: &Network, every: Duration) -> Self {
         Self { network: network.clone(), begin: network.now(), every, next: 0 }

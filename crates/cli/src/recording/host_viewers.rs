@@ -20,9 +20,9 @@ const MOST_FRAMES: usize = 8_000;
 const SIGNALS: [&str; 6] = ["velocity_rpm", "output_angle_rad", "current_a", "supply_v", "motor_c", "driver_c"];
 
 /// Viewers of a host; without a server it does nothing.
-pub(crate) struct HostViewers(Option<RefCell<Shown>>);
+pub(crate) struct HostViewers(Option<RefCell<ViewerFeed>>);
 
-struct Shown {
+struct ViewerFeed {
     server: Server,
     /// The drives that have a channel, and when the last values of each were read, s.
     drives: Vec<(u8, f64)>,
@@ -31,7 +31,7 @@ struct Shown {
 
 impl HostViewers {
     pub(crate) fn new(server: Option<Server>) -> Self {
-        Self(server.map(|server| RefCell::new(Shown { server, drives: Vec::new(), batch: Batch::default() })))
+        Self(server.map(|server| RefCell::new(ViewerFeed { server, drives: Vec::new(), batch: Batch::default() })))
     }
 
     /// Notes a frame on its way to the host.
@@ -67,7 +67,7 @@ impl HostViewers {
     }
 }
 
-impl Shown {
+impl ViewerFeed {
     fn note(&mut self, passed: &BusFrame) {
         if !self.server.is_watched() {
             return;

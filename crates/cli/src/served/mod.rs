@@ -18,7 +18,7 @@ use crate::session::{no_runtime, runtime};
 use crate::signals::{EndSignals, Signals};
 
 /// What is asked of a served world, and why it ends.
-pub(crate) type Asked = Request<Failure>;
+pub(crate) type ServiceRequest = Request<Failure>;
 
 /// What `--clock` says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -75,7 +75,7 @@ pub(crate) fn at_the_end(ended: Result<(), Failure>, parted: Parted) -> Result<(
 
 /// Listens to signals from now on, in a thread of its own. The first asks for the end; if that takes too long, or a second
 /// one comes, the process ends at once. Stores that were acknowledged are on the disk in any case.
-pub(crate) fn listen_to_signals(requests: mpsc::Sender<Asked>) {
+pub(crate) fn listen_to_signals(requests: mpsc::Sender<ServiceRequest>) {
     let (ready, listening) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let Ok(runtime) = runtime() else { return };
@@ -84,7 +84,7 @@ pub(crate) fn listen_to_signals(requests: mpsc::Sender<Asked>) {
             drop(ready);
             let signal = signals.next().await;
             let asked = async {
-                let _ = requests.send(Asked::Ended(crate::failure::ended_by(signal))).await;
+                let _ = requests.send(ServiceRequest::Ended(crate::failure::ended_by(signal))).await;
                 std::future::pending::<()>().await;
             };
             tokio::select! {

@@ -15,24 +15,24 @@ use crate::subject::{bytes_of, number_of};
 pub(crate) const CASES: &[Case] = &[
     case!("PDO 01", "Parameters of the receive PDOs", "CiA 301, 7.5.2.35", [Need::Rpdo], [], |bench| parameters(bench, 0x1400)),
     case!("PDO 02", "Parameters of the transmit PDOs", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| parameters(bench, 0x1800)),
-    case!("PDO 03", "A remote frame is answered in operational", "CiA 301, 7.2.2.5.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Remote, NmtPhase::Operational)),
-    case!("PDO 04", "Event-driven: sent when what it carries changes", "CiA 301, 7.2.2.3", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::Operational)),
-    case!("PDO 05", "Event timer: sent with its period", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::Operational)),
-    case!("PDO 06", "Synchronous, cyclic: sent after every nth SYNC", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::Operational)),
-    case!("PDO 07", "Synchronous, acyclic: sent after a SYNC only", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::Operational)),
-    case!("PDO 08", "SYNC start value: counted from that SYNC on", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::Operational)),
-    case!("PDO 09", "A remote frame is not answered in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, NmtPhase::Stopped)),
-    case!("PDO 10", "Event-driven: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::Stopped)),
-    case!("PDO 11", "Event timer: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::Stopped)),
-    case!("PDO 12", "Synchronous, cyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::Stopped)),
-    case!("PDO 13", "Synchronous, acyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::Stopped)),
-    case!("PDO 14", "SYNC start value: nothing in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::Stopped)),
-    case!("PDO 15", "A remote frame is not answered in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, Way::Remote, NmtPhase::PreOperational)),
-    case!("PDO 16", "Event-driven: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Event, NmtPhase::PreOperational)),
-    case!("PDO 17", "Event timer: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Timer, NmtPhase::PreOperational)),
-    case!("PDO 18", "Synchronous, cyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Cyclic, NmtPhase::PreOperational)),
-    case!("PDO 19", "Synchronous, acyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, Way::Acyclic, NmtPhase::PreOperational)),
-    case!("PDO 20", "SYNC start value: nothing in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], [], |bench| in_state(bench, Way::StartValue, NmtPhase::PreOperational)),
+    case!("PDO 03", "A remote frame is answered in operational", "CiA 301, 7.2.2.5.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Remote, NmtPhase::Operational)),
+    case!("PDO 04", "Event-driven: sent when what it carries changes", "CiA 301, 7.2.2.3", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Event, NmtPhase::Operational)),
+    case!("PDO 05", "Event timer: sent with its period", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Timer, NmtPhase::Operational)),
+    case!("PDO 06", "Synchronous, cyclic: sent after every nth SYNC", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Cyclic, NmtPhase::Operational)),
+    case!("PDO 07", "Synchronous, acyclic: sent after a SYNC only", "CiA 301, 7.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Acyclic, NmtPhase::Operational)),
+    case!("PDO 08", "SYNC start value: counted from that SYNC on", "CiA 301, 7.5.2.37", [Need::Tpdo], [], |bench| in_state(bench, TriggeredBy::StartValue, NmtPhase::Operational)),
+    case!("PDO 09", "A remote frame is not answered in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, TriggeredBy::Remote, NmtPhase::Stopped)),
+    case!("PDO 10", "Event-driven: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Event, NmtPhase::Stopped)),
+    case!("PDO 11", "Event timer: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Timer, NmtPhase::Stopped)),
+    case!("PDO 12", "Synchronous, cyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Cyclic, NmtPhase::Stopped)),
+    case!("PDO 13", "Synchronous, acyclic: not sent in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Acyclic, NmtPhase::Stopped)),
+    case!("PDO 14", "SYNC start value: nothing in stopped", "CiA 301, 7.3.2.2.4", [Need::Tpdo], [], |bench| in_state(bench, TriggeredBy::StartValue, NmtPhase::Stopped)),
+    case!("PDO 15", "A remote frame is not answered in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["starts_operational"], |bench| in_state(bench, TriggeredBy::Remote, NmtPhase::PreOperational)),
+    case!("PDO 16", "Event-driven: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Event, NmtPhase::PreOperational)),
+    case!("PDO 17", "Event timer: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Timer, NmtPhase::PreOperational)),
+    case!("PDO 18", "Synchronous, cyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Cyclic, NmtPhase::PreOperational)),
+    case!("PDO 19", "Synchronous, acyclic: not sent in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], ["tpdo_answers_rpdo"], |bench| in_state(bench, TriggeredBy::Acyclic, NmtPhase::PreOperational)),
+    case!("PDO 20", "SYNC start value: nothing in pre-operational", "CiA 301, 7.3.2.2.2", [Need::Tpdo], [], |bench| in_state(bench, TriggeredBy::StartValue, NmtPhase::PreOperational)),
     case!("PDO 51", "Inhibit time: never sent sooner", "CiA 301, 7.5.2.37", [Need::Tpdo], ["pdo_timers", "tpdo_answers_rpdo"], inhibit_time),
     case!("PDO 52", "A receive PDO writes what it carries", "CiA 301, 7.2.2.5.1", [Need::Rpdo], ["fixed_mapping"], receive),
     case!("PDO 53", "A receive PDO of pre-operational is dropped, not kept for operational", "CiA 301, 7.3.2.2.2", [Need::Rpdo], ["starts_operational", "fixed_mapping"], receive_before_start),
@@ -73,7 +73,7 @@ async fn parameters(bench: &mut Bench, base: u16) -> Verdict {
 
 /// What makes a transmit PDO be sent.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum TriggeredBy {
     Remote,
     Event,
     Timer,
@@ -94,17 +94,17 @@ const TIMER_MS: u16 = 100;
 /// SYNCs from one to the next of a cyclic PDO.
 const CYCLE: u8 = 2;
 
-async fn in_state(bench: &mut Bench, way: Way, phase: NmtPhase) -> Verdict {
+async fn in_state(bench: &mut Bench, way: TriggeredBy, phase: NmtPhase) -> Verdict {
     bench.nmt(NmtCommand::EnterPreOperational).await;
-    if way == Way::StartValue {
+    if way == TriggeredBy::StartValue {
         return start_value(bench, phase).await;
     }
     let (transmission, timer) = match way {
-        Way::Remote => (253, 0),
-        Way::Event => (255, 0),
-        Way::Timer => (255, TIMER_MS),
-        Way::Cyclic => (CYCLE, 0),
-        Way::Acyclic | Way::StartValue => (0, 0),
+        TriggeredBy::Remote => (253, 0),
+        TriggeredBy::Event => (255, 0),
+        TriggeredBy::Timer => (255, TIMER_MS),
+        TriggeredBy::Cyclic => (CYCLE, 0),
+        TriggeredBy::Acyclic | TriggeredBy::StartValue => (0, 0),
     };
     let tpdo = bench.set_up_tpdo(transmission, timer).await?;
     enter(bench, phase).await;
@@ -125,13 +125,13 @@ async fn enter(bench: &mut Bench, phase: NmtPhase) {
     }
 }
 
-async fn sent(bench: &mut Bench, way: Way, tpdo: Tpdo) -> Verdict {
+async fn sent(bench: &mut Bench, way: TriggeredBy, tpdo: Tpdo) -> Verdict {
     match way {
-        Way::Remote => answered(bench, tpdo).await,
-        Way::Event => sent_with_change(bench, tpdo).await,
-        Way::Timer => sent_with_timer(bench, tpdo).await,
-        Way::Cyclic => sent_every_nth(bench, tpdo).await,
-        Way::Acyclic | Way::StartValue => sent_after_sync(bench, tpdo).await,
+        TriggeredBy::Remote => answered(bench, tpdo).await,
+        TriggeredBy::Event => sent_with_change(bench, tpdo).await,
+        TriggeredBy::Timer => sent_with_timer(bench, tpdo).await,
+        TriggeredBy::Cyclic => sent_every_nth(bench, tpdo).await,
+        TriggeredBy::Acyclic | TriggeredBy::StartValue => sent_after_sync(bench, tpdo).await,
     }
 }
 
@@ -254,22 +254,26 @@ fn end_if_no_sync(bench: &Bench) -> Result<(), Finding> {
     Ok(())
 }
 
-async fn unsent(bench: &mut Bench, way: Way, phase: NmtPhase, tpdo: Tpdo) -> Verdict {
+async fn unsent(bench: &mut Bench, way: TriggeredBy, phase: NmtPhase, tpdo: Tpdo) -> Verdict {
     // What was on its way when the node was stopped is not meant.
     if phase == NmtPhase::Stopped {
         bench.count(tpdo.id);
     }
     match way {
-        Way::Remote => bench.send(Frame::remote(tpdo.id, 8)),
-        Way::Event | Way::Acyclic if phase == NmtPhase::PreOperational => {
+        TriggeredBy::Remote => bench.send(Frame::remote(tpdo.id, 8)),
+        TriggeredBy::Event | TriggeredBy::Acyclic if phase == NmtPhase::PreOperational => {
             if let Some(row) = tpdo.mapped {
                 bench.change(row).await?;
             }
         }
-        Way::Timer | Way::Event | Way::Cyclic | Way::Acyclic | Way::StartValue => {}
+        TriggeredBy::Timer
+        | TriggeredBy::Event
+        | TriggeredBy::Cyclic
+        | TriggeredBy::Acyclic
+        | TriggeredBy::StartValue => {}
     }
     bench.pause(ms(u64::from(TIMER_MS) * 3)).await;
-    if matches!(way, Way::Cyclic | Way::Acyclic) {
+    if matches!(way, TriggeredBy::Cyclic | TriggeredBy::Acyclic) {
         for _ in 0..2 * CYCLE {
             bench.sync(None, tpdo.id).await;
         }

@@ -43,7 +43,7 @@ const LAST_TPDO_MAPPING: u16 = TPDO_MAPPING + PdoNumber::MAX - 1;
 /// The services of one device.
 #[derive(Clone, Debug)]
 pub struct Services<S: Storage> {
-    watches: [Option<Watch>; CONSUMERS],
+    watches: [Option<HeartbeatConsumer>; CONSUMERS],
     /// None of a device without 100Ch and 100Dh, and while heartbeats are produced: a device does one of the two.
     guarding: Option<Guarding>,
     /// Whose remote frames guard.
@@ -59,7 +59,7 @@ pub struct Services<S: Storage> {
 
 /// A node whose heartbeat is watched.
 #[derive(Clone, Copy, Debug)]
-struct Watch {
+struct HeartbeatConsumer {
     /// Of the entry of 1016h.
     sub_index: u8,
     consumer: Consumer,
@@ -67,7 +67,7 @@ struct Watch {
     is_lost: bool,
 }
 
-impl Watch {
+impl HeartbeatConsumer {
     fn of(sub_index: u8, raw: u32) -> Option<Self> {
         Some(Self { sub_index, consumer: Consumer::from_raw(raw)?, is_lost: false })
     }
@@ -205,10 +205,10 @@ impl<S: Storage> Services<S> {
 
     /// An entry of 1016h has this value now; true if it was the watch over one that is missed.
     fn watch(&mut self, sub_index: u8, raw: u32) -> bool {
-        let of_entry = |watch: &Option<Watch>| watch.is_some_and(|watch| watch.sub_index == sub_index);
+        let of_entry = |watch: &Option<HeartbeatConsumer>| watch.is_some_and(|watch| watch.sub_index == sub_index);
         let position = self.watches.iter().position(of_entry).or_else(|| self.watches.iter().position(Option::is_none));
         let Some(position) = position else { return false };
-        let before = core::mem::replace(&mut self.watches[position], Watch::of(sub_index, raw));
+        let before = core::mem::replace(&mut self.watches[position], HeartbeatConsumer::of(sub_index, raw));
         before.is_some_and(|watch| watch.is_lost)
     }
 
@@ -358,10 +358,10 @@ fn is_not_destination(_: &View<'_>, raw: u32) -> Result<(), AbortCode> {
 }
 
 /// Entries of 1016h that name a node.
-fn entries(values: View<'_>) -> impl Iterator<Item = Watch> {
+fn entries(values: View<'_>) -> impl Iterator<Item = HeartbeatConsumer> {
     (1..=MAX_CONSUMERS).filter_map(move |sub_index| {
         let raw = values.value(Mux::new(WATCH, sub_index)).ok()?;
-        Watch::of(sub_index, raw as u32)
+        HeartbeatConsumer::of(sub_index, raw as u32)
     })
 }
 

@@ -26,7 +26,7 @@ pub use hardware::{Actuation, AxisActuation, AxisSensors, Hardware, MAX_AXES, Po
 pub use motor::{CONTROL_PERIOD_NS, Motor, SpeedWorth};
 
 use canopen::object::COMMUNICATION_CYCLE_PERIOD;
-use canopen::od::{Condition, Dictionary, Entry, Slot, Storage, Table, View};
+use canopen::od::{Check, Condition, Dictionary, Entry, Slot, Storage, Table, View};
 use canopen::{AbortCode, Mux};
 use cia402::object::{HOMING_METHOD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION};
 use cia402::{
@@ -94,8 +94,6 @@ pub fn conditions(description: &'static Description) -> impl Iterator<Item = (Sl
         stops.chain(factors).chain(without_effect).chain(node::conditions(table)).chain(node::no_destinations(table));
     modes.chain(set_points).chain(methods).chain(types).chain(others)
 }
-
-type Check = fn(&View<'_>, u32) -> Result<(), AbortCode>;
 
 /// Index within the block of an axis, and sub-index, of what hosts write as they set the buffer of interpolated position up and
 /// cannot read (60C4h:05): a set-point has the bytes of 60C1h whatever they say.

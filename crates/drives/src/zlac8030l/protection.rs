@@ -27,12 +27,12 @@ pub(super) struct Protection {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct WireWatch {
     /// U, V and W since they last carried something.
-    empty: [Way; 3],
+    empty: [ElectricalTravel; 3],
 }
 
 /// Where a rotor has been, in electrical turns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Way {
+struct ElectricalTravel {
     /// From where it began.
     at: f32,
     lowest: f32,
@@ -41,7 +41,7 @@ struct Way {
     whole: f32,
 }
 
-impl Way {
+impl ElectricalTravel {
     fn go_on(&mut self, turns: f32) {
         self.at += turns;
         self.lowest = self.lowest.min(self.at);
@@ -61,7 +61,7 @@ impl WireWatch {
         let mut off = false;
         for (empty, current_a) in self.empty.iter_mut().zip(currents_a) {
             if current_a >= carried_a {
-                *empty = Way::default();
+                *empty = ElectricalTravel::default();
             } else if most_a >= LOOSE_WIRE_OTHERS_A {
                 empty.go_on(turned);
             }

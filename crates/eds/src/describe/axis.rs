@@ -19,16 +19,16 @@ pub(super) fn axes(table: &'static Table, device_type: u32) -> Vec<AxisDescripti
         return Vec::new();
     }
     let placements = (0..MOST_AXES).map(|number| Placement::IndexOffset(number * BLOCK));
-    placements.filter_map(|placement| Objects { table, placement }.axis()).collect()
+    placements.filter_map(|placement| AxisObjects { table, placement }.axis()).collect()
 }
 
 /// The objects of one axis, named as those of the first.
-struct Objects {
+struct AxisObjects {
     table: &'static Table,
     placement: Placement,
 }
 
-impl Objects {
+impl AxisObjects {
     fn axis(&self) -> Option<AxisDescription> {
         if !(self.has(0x6040, 0) && self.has(0x6041, 0)) {
             return None;

@@ -20,10 +20,10 @@ use crate::Eds;
 
 /// All descriptions that were made of files, by a fingerprint of what the files say: one for each place that such a file
 /// came from.
-static KEPT: LazyLock<Mutex<Kept>> = LazyLock::new(Mutex::default);
+static KEPT: LazyLock<Mutex<Cache>> = LazyLock::new(Mutex::default);
 
 #[derive(Default)]
-struct Kept {
+struct Cache {
     /// Two keys of this program's run, so that no file can be made to look like another.
     keys: [RandomState; 2],
     descriptions: HashMap<Fingerprint, Vec<&'static Description>>,
@@ -32,7 +32,7 @@ struct Kept {
 /// Two hashes of 64 bits.
 type Fingerprint = [u64; 2];
 
-impl Kept {
+impl Cache {
     fn fingerprint(&self, eds: &Eds) -> Fingerprint {
         self.keys.each_ref().map(|key| key.hash_one(eds))
     }

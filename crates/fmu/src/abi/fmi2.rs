@@ -449,7 +449,7 @@ mod tests {
         let (_resources, uri, _) = resources("experiment");
         let folder = folder(uri.to_str().unwrap()).unwrap();
         let instance = crate::instance::Instance::new(folder.as_ref(), false).unwrap();
-        let handle = held::add(held::Held::new(instance, Log::new(null_mut(), Some(log))));
+        let handle = held::add(held::LoggedInstance::new(instance, Log::new(null_mut(), Some(log))));
         assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, f64::NAN, 0, 0.0), ERROR);
         assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 4.0), ERROR);
         assert_eq!(fmi2EnterInitializationMode(handle), OK);

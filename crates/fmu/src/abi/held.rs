@@ -14,7 +14,7 @@ use crate::state::SavedState;
 use crate::xml;
 
 /// An instance with what belongs to its importer.
-pub(super) struct Held {
+pub(super) struct LoggedInstance {
     pub(super) instance: Instance,
     pub(super) log: Log,
     /// A call panicked in the middle.
@@ -47,7 +47,7 @@ enum Message {
 #[derive(Default)]
 struct Instances {
     last: usize,
-    held: ByNumber<Held>,
+    held: ByNumber<LoggedInstance>,
 }
 
 type ByNumber<T> = HashMap<usize, Arc<Mutex<T>>>;
@@ -105,14 +105,14 @@ pub(super) fn checked(
 /// Makes an instance and gives its handle; null if that fails, for which there is a message.
 pub(super) fn make(log: Log, work: impl FnOnce() -> Result<Instance, String> + UnwindSafe) -> *mut c_void {
     match std::panic::catch_unwind(work) {
-        Ok(Ok(instance)) => return add(Held::new(instance, log)),
+        Ok(Ok(instance)) => return add(LoggedInstance::new(instance, log)),
         Ok(Err(error)) => log.say(ERROR, &error),
         Err(_) => log.say(FATAL, DEFECT),
     }
     std::ptr::null_mut()
 }
 
-impl Held {
+impl LoggedInstance {
     pub(super) fn new(instance: Instance, log: Log) -> Self {
         Self { instance, log, is_broken: false, states: HashMap::new(), span_s: (0.0, None), texts: Vec::new() }
     }
@@ -126,7 +126,7 @@ impl Held {
 }
 
 /// Adds an instance and gives its handle.
-pub(super) fn add(held: Held) -> *mut c_void {
+pub(super) fn add(held: LoggedInstance) -> *mut c_void {
     let mut instances = INSTANCES.lock().unwrap_or_else(PoisonError::into_inner);
     instances.last += 1;
     let number = instances.last;
@@ -135,7 +135,7 @@ pub(super) fn add(held: Held) -> *mut c_void {
 }
 
 /// The instance of a handle.
-pub(super) fn instance(handle: *mut c_void) -> Option<Arc<Mutex<Held>>> {
+pub(super) fn instance(handle: *mut c_void) -> Option<Arc<Mutex<LoggedInstance>>> {
     INSTANCES.lock().unwrap_or_else(PoisonError::into_inner).held.get(&(handle as usize)).cloned()
 }
 

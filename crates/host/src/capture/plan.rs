@@ -20,7 +20,7 @@ use words::counted;
 use words::failure::Failure;
 
 /// A TPDO as it is set up.
-type Tpdo = (PdoConfig, CobId);
+type ConfiguredTpdo = (PdoConfig, CobId);
 
 /// The bits of a PDO (CiA 301, 7.2.2.5).
 const BITS: u32 = u64::BITS;
@@ -110,7 +110,8 @@ pub fn plan(
     let mut room = Ok(());
     for pace in paces {
         // Where a TPDO does not take this pace, another may, or another pace.
-        let suited: Vec<Slot> = spare.iter().filter_map(|tpdo| Slot::new(model, node, tpdo, pace, request)).collect();
+        let suited: Vec<SpareTpdo> =
+            spare.iter().filter_map(|tpdo| SpareTpdo::new(model, node, tpdo, pace, request)).collect();
         let count = suited.len();
         match packed(&records, suited) {
             Ok(slots) => return on_the_bus(model, node, (now, &spare), request, pace, &slots, &refused),
@@ -191,13 +192,13 @@ fn nearest(time: Duration, step: Duration) -> Duration {
 
 /// A spare TPDO, and what has been put into it.
 #[derive(Clone, Debug)]
-struct Slot {
+struct SpareTpdo {
     config: PdoConfig,
     cob_id: CobId,
     most: usize,
 }
 
-impl Slot {
+impl SpareTpdo {
     /// `None` where it does not take this pace, or has no identifier.
     fn new(
         model: &'static Description,
@@ -235,7 +236,7 @@ impl Slot {
 }
 
 /// Puts the records into as few TPDOs as they take, the longest first; or those that have no place.
-fn packed(records: &[MappingRecord], mut slots: Vec<Slot>) -> Result<Vec<Slot>, Vec<MappingRecord>> {
+fn packed(records: &[MappingRecord], mut slots: Vec<SpareTpdo>) -> Result<Vec<SpareTpdo>, Vec<MappingRecord>> {
     let mut longest_first = records.to_vec();
     longest_first.sort_by_key(|record| std::cmp::Reverse(record.bits));
     let mut left = Vec::new();
@@ -284,10 +285,10 @@ fn no_room(
 fn on_the_bus(
     model: &'static Description,
     node: NodeId,
-    (now, spare): (&[Tpdo], &[&Tpdo]),
+    (now, spare): (&[ConfiguredTpdo], &[&ConfiguredTpdo]),
     request: &Request<'_>,
     pace: Pace,
-    slots: &[Slot],
+    slots: &[SpareTpdo],
     refused: &impl Fn(String) -> Failure,
 ) -> Result<CapturePlan, Failure> {
     let mut values = BTreeMap::new();
@@ -331,7 +332,7 @@ fn on_the_bus(
 fn bus_with(
     model: &'static Description,
     node: NodeId,
-    now: &[Tpdo],
+    now: &[ConfiguredTpdo],
     values: &BTreeMap<Mux, Vec<u8>>,
     (request, pace, period): (&Request<'_>, Pace, Duration),
     is_asked_for: impl Fn(PdoId) -> bool,

@@ -26,7 +26,7 @@ pub(super) struct Changed {
     /// What is being moved.
     motion: Option<Moving>,
     /// What was written, the oldest first.
-    written: Vec<Written>,
+    written: Vec<WrittenObjects>,
     /// The node was not operational.
     pub(super) started: bool,
     /// Identifiers of the TPDOs that came, and the time between two of each.
@@ -48,7 +48,7 @@ struct Moving {
 
 /// Objects that were written together.
 #[derive(Debug)]
-struct Written {
+struct WrittenObjects {
     /// The writes that lead back, in their order.
     undo: Arc<[(Mux, Vec<u8>)]>,
     /// Their copy on the disk.
@@ -139,7 +139,7 @@ impl Restorer {
 
     /// Objects are going to be written, and these writes lead back.
     pub(crate) fn note_written(&self, undo: Vec<(Mux, Vec<u8>)>, journal: Option<Kept>) {
-        self.lock().written.push(Written { undo: undo.into(), journal });
+        self.lock().written.push(WrittenObjects { undo: undo.into(), journal });
     }
 
     /// What was written last stays.

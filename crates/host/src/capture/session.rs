@@ -56,7 +56,7 @@ pub struct Span {
 
 /// A TPDO that brings readings.
 #[derive(Debug)]
-struct Source {
+struct TpdoSource {
     id: u16,
     /// Columns with the bits that they have in the frame.
     fields: Vec<(usize, std::ops::Range<u32>)>,
@@ -80,7 +80,7 @@ pub struct Running {
     plan: Option<CapturePlan>,
     period: Duration,
     log: Option<FrameLog>,
-    sources: Vec<Source>,
+    sources: Vec<TpdoSource>,
     truth: Option<Truth>,
     parameters: std::collections::BTreeMap<Mux, Vec<u8>>,
     rows: Rows,
@@ -295,7 +295,7 @@ impl Running {
                 Some((column, config.map.find(quantity.object).filter(|_| is_by_it)?))
             });
             let heard_at = self.drive.node().network().now();
-            self.sources.push(Source { id: *id, fields: columns.collect(), heard_at });
+            self.sources.push(TpdoSource { id: *id, fields: columns.collect(), heard_at });
         }
         let ids: Vec<u16> = plan.pdos.iter().map(|(_, id)| *id).collect();
         self.log = Some(self.drive.node().network().log_frames(&ids, LOG));

@@ -69,12 +69,12 @@ pub struct Pending {
 pub struct Control<S> {
     clients: BTreeMap<ClientNumber, Client<S>>,
     token: Option<String>,
-    kept: Option<Kept>,
+    kept: Option<QueuedEvents>,
 }
 
 /// Events for one who takes them as values.
 #[derive(Debug, Default)]
-struct Kept {
+struct QueuedEvents {
     events: Vec<Event>,
     missed: u64,
 }
@@ -111,7 +111,9 @@ impl<S: Sink> Control<S> {
     /// The events since the last call, if they are kept; at most [`MAX_WAITING`], and then how many are missing.
     pub fn take_events(&mut self, world: &mut World) -> Vec<Event> {
         self.publish(world);
-        let Some(Kept { mut events, missed }) = self.kept.as_mut().map(std::mem::take) else { return Vec::new() };
+        let Some(QueuedEvents { mut events, missed }) = self.kept.as_mut().map(std::mem::take) else {
+            return Vec::new();
+        };
         if missed > 0 {
             events.push(Event { at: world.now(), place: None, kind: EventKind::Missed(missed) });
         }

@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn who_may_not_read_a_machine_file_is_not_shown_how_to_write_one() {
-        assert_eq!(remedy(Some(ErrorKind::PermissionDenied)), "give this account the right to read it");
-        assert!(remedy(None).contains("[[drive]]") && remedy(Some(ErrorKind::NotFound)).contains("[[drive]]"));
+        assert_eq!(remedy(Some(ErrorKind::PermissionDenied), ""), "give this account the right to read it");
+        assert!(remedy(None, "").contains("[[drive]]") && remedy(Some(ErrorKind::NotFound), "").contains("[[drive]]"));
     }
 }

@@ -75,7 +75,7 @@ pub async fn program(
     data: &[u8],
     progress: &impl Progress,
 ) -> Result<ProgramReport, Failure> {
-    let target = Target { network, node: network.node(node), number };
+    let target = ProgramArea { network, node: network.node(node), number };
     target.is_without_power().await?;
     let checksum = crc32(data);
     let before = target.read_u32(IDENTIFICATION).await?;
@@ -117,13 +117,13 @@ pub async fn program(
 }
 
 /// A program of a node.
-struct Target<'a> {
+struct ProgramArea<'a> {
     network: &'a Network,
     node: Node,
     number: u8,
 }
 
-impl Target<'_> {
+impl ProgramArea<'_> {
     const fn object(&self, index: u16) -> Mux {
         Mux::new(index, self.number)
     }

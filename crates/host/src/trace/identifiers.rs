@@ -10,7 +10,7 @@ use can::{BusFrame, Instant};
 use master::decode::Decoded;
 use serde::Serialize;
 
-use super::line::Line;
+use super::line::TraceLine;
 use super::query::{MOST_SEARCHED, Query};
 use super::ring::Held;
 
@@ -26,7 +26,7 @@ struct Identifier {
     least_ms: Option<f64>,
     most_ms: Option<f64>,
     /// The last one.
-    last: Line,
+    last: TraceLine,
 }
 
 /// What the frames from `from` to below `to` are, by identifier.
@@ -64,7 +64,7 @@ impl Passing {
 
     fn ended(self) -> Identifier {
         let Self { count, first, least, most, last: (number, passed, decoded) } = self;
-        let last = Line::of_frame(number, &passed, &decoded);
+        let last = TraceLine::of_frame(number, &passed, &decoded);
         let first_s = (first - Instant::ZERO).as_secs_f64();
         let ms = |time: Duration| time.as_nanos() as f64 / 1e6;
         Identifier { id: last.id.clone(), count, first_s, least_ms: least.map(ms), most_ms: most.map(ms), last }
@@ -79,7 +79,7 @@ impl Query {
         let from = floor.max(to.saturating_sub(MOST_SEARCHED)).min(to);
         let mut found: BTreeMap<(bool, u32), Passing> = BTreeMap::new();
         self.each(held, from, to, |number, passed, decoded, _| {
-            if !self.words().is_empty() && !Line::of_frame(number, passed, decoded).has(self.words()) {
+            if !self.words().is_empty() && !TraceLine::of_frame(number, passed, decoded).has(self.words()) {
                 return;
             }
             let id = passed.frame.id();

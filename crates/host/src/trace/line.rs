@@ -13,7 +13,7 @@ use can::BusFrame;
 
 /// A line of the trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Line {
+pub(super) struct TraceLine {
     /// Number of the frame, from 0 in bus order.
     pub(super) number: u64,
     /// Bus time.
@@ -34,7 +34,7 @@ pub(super) struct Line {
     pub(super) took_ms: Option<f64>,
 }
 
-impl Line {
+impl TraceLine {
     /// A frame.
     pub(super) fn of_frame(number: u64, passed: &BusFrame, decoded: &Decoded) -> Self {
         Self {

@@ -7,7 +7,7 @@ use canopen::NodeId;
 use master::decode::{Decoded, ServiceKind};
 use serde::{Deserialize, Serialize};
 
-use super::line::{Begun, Line, Transfers};
+use super::line::{Begun, TraceLine, Transfers};
 use super::ring::Held;
 
 /// Default number of lines, and most lines.
@@ -70,7 +70,7 @@ pub struct Selection {
     pub(super) oldest: u64,
     /// Number of the next frame.
     pub(super) next: u64,
-    pub(super) lines: VecDeque<Line>,
+    pub(super) lines: VecDeque<TraceLine>,
 }
 
 impl Asked {
@@ -166,12 +166,12 @@ impl Query {
         self.nodes.is_empty() && self.kinds.is_empty() && self.words.is_empty() && !self.follows_transfers()
     }
 
-    fn lines(&self, held: &Held, from: u64, to: u64) -> VecDeque<Line> {
+    fn lines(&self, held: &Held, from: u64, to: u64) -> VecDeque<TraceLine> {
         let mut lines = VecDeque::new();
         self.each(held, from, to, |number, passed, decoded, begun| {
             let line = match decoded {
-                Decoded::Sdo(sdo) if self.transfers => Line::of_transfer(number, passed, decoded, sdo, begun),
-                _ => Some(Line::of_frame(number, passed, decoded)),
+                Decoded::Sdo(sdo) if self.transfers => TraceLine::of_transfer(number, passed, decoded, sdo, begun),
+                _ => Some(TraceLine::of_frame(number, passed, decoded)),
             };
             lines.extend(line.filter(|line| line.has(&self.words)));
         });

@@ -80,7 +80,7 @@ pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Resul
     let failed = |reason: &dyn std::fmt::Display| {
         Failure::new(format!("nothing can be found from the capture of node {}", capture.place)).because(reason)
     };
-    let signals = Signals::of(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
+    let signals = UsedTraces::of(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
     let (samples, mut notes) = signals.samples(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
     if capture.is_cut_off {
         notes.push("the end of the file is missing: what is there was used".to_owned());
@@ -121,14 +121,14 @@ pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Resul
 }
 
 /// The traces that are used, each with what its unit is worth.
-struct Signals<'a> {
+struct UsedTraces<'a> {
     current: (&'a Trace, f64),
     motion: (&'a Trace, f64),
     is_angle: bool,
     set_point: Option<(&'a Trace, f64)>,
 }
 
-impl<'a> Signals<'a> {
+impl<'a> UsedTraces<'a> {
     fn of(capture: &'a Capture) -> Result<Self, String> {
         let find = |names: &[(&str, f64)]| {
             names.iter().find_map(|(name, worth)| {

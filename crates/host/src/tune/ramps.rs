@@ -128,7 +128,7 @@ pub fn open_loop_of(drive: &Drive) -> Option<(&'static Description, &'static Ope
 }
 
 /// Objects of a drive, by what they are for.
-struct Objects {
+struct RampObjects {
     up: Mux,
     down: Mux,
     quick_stop: Mux,
@@ -143,7 +143,7 @@ struct Objects {
 struct Known {
     model: &'static Description,
     open_loop: &'static OpenLoop,
-    objects: Objects,
+    objects: RampObjects,
     stepper: StepperData,
     supply_v: f64,
     /// All that turns.
@@ -152,7 +152,7 @@ struct Known {
     had: Vec<(Mux, i64)>,
 }
 
-impl Objects {
+impl RampObjects {
     fn of(model: &Description, open_loop: &OpenLoop) -> Option<Self> {
         let units = model.axes.first()?.units;
         let Some(Ramps::Times { acceleration, deceleration, quick_stop }) = units.ramps else { return None };
@@ -177,12 +177,12 @@ impl Known {
             |reason: &str| Failure::new(format!("node {id}: no ramps can be computed")).at_node(id).because(reason);
         let (model, open_loop) =
             open_loop_of(drive).ok_or_else(|| failed("its model is not a stepper in an open loop"))?;
-        let objects = Objects::of(model, open_loop)
+        let objects = RampObjects::of(model, open_loop)
             .ok_or_else(|| failed("its description names no times of its ramps, or no table of microsteps"))?;
         let stepper = stepper_of(model).ok_or_else(|| failed("no data of its motor are known"))?;
         let voltage = model.axes[0].units.bus_voltage.ok_or_else(|| failed("it does not show its bus voltage"))?;
         let supply_v = drive.read_quantity(voltage).await?;
-        let Objects { up, down, quick_stop, microsteps, profile_velocity, start, end, .. } = objects;
+        let RampObjects { up, down, quick_stop, microsteps, profile_velocity, start, end, .. } = objects;
         let standstill = open_loop.standstill.0;
         let mut had = Vec::new();
         for object in [open_loop.current, standstill, microsteps, up, down, quick_stop, profile_velocity, start, end] {

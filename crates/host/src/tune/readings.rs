@@ -50,7 +50,7 @@ pub struct Currents {
 
 /// One round of readings.
 #[derive(Clone, Copy, Debug)]
-struct Reading {
+struct ShaftReading {
     at: Instant,
     turns: f64,
     rpm: f64,
@@ -105,7 +105,7 @@ impl Reader {
         self.drive.node().network().now()
     }
 
-    async fn look(&mut self) -> Result<Reading, Failure> {
+    async fn look(&mut self) -> Result<ShaftReading, Failure> {
         let current_a = self.drive.read_quantity(self.current).await?.abs();
         let at = self.now();
         let rpm = self.drive.read_quantity(self.speed).await?;
@@ -114,11 +114,11 @@ impl Reader {
         let seen = self.excursion.reached(turns, current_a);
         self.bounds.keep(&seen, current_a, self.drive.node().id())?;
         self.excursion = seen;
-        Ok(Reading { at, turns, rpm, current_a })
+        Ok(ShaftReading { at, turns, rpm, current_a })
     }
 
     /// Looks for this long.
-    async fn watch(&mut self, time: Duration) -> Result<Vec<Reading>, Failure> {
+    async fn watch(&mut self, time: Duration) -> Result<Vec<ShaftReading>, Failure> {
         let (until, mut readings) = (self.now() + time, Vec::new());
         while self.now() < until {
             readings.push(self.look().await?);
@@ -133,7 +133,7 @@ impl Reader {
     }
 
     /// Turns it, and looks until it has this speed.
-    async fn reach(&mut self, rpm: f64) -> Result<Vec<Reading>, Failure> {
+    async fn reach(&mut self, rpm: f64) -> Result<Vec<ShaftReading>, Failure> {
         self.turn(rpm, Some(Ramp::RpmPerSecond(RAMP_RPM_S))).await?;
         let (until, mut readings) = (self.now() + PATIENCE, Vec::new());
         while self.now() < until {
@@ -168,7 +168,7 @@ impl Reader {
         for number in 0..REVERSALS {
             let to = if number % 2 == 0 { speed } else { -speed };
             let readings = self.reach(to).await?;
-            let share = |reading: &Reading| reading.rpm / to;
+            let share = |reading: &ShaftReading| reading.rpm / to;
             for reading in readings.iter().filter(|reading| (WINDOW[0]..=WINDOW[1]).contains(&share(reading))) {
                 (sum_a, shares, count) = (sum_a + reading.current_a, shares + share(reading), count + 1.0);
             }

@@ -52,10 +52,10 @@ pub(super) fn around(table: &Table<'_>, problems: &mut Vec<Problem>) -> Vec<(Sti
 }
 
 /// What makes world commands of a part of the table.
-type TablePart = fn(&Table<'_>) -> Vec<Said>;
+type TablePart = fn(&Table<'_>) -> Vec<WordsOrProblem>;
 
 /// A world command, or what is wrong where one would come from.
-type Said = Result<Words, Problem>;
+type WordsOrProblem = Result<Words, Problem>;
 
 /// A world command without its node, and where it comes from.
 struct Words {
@@ -90,7 +90,7 @@ impl Sentence {
     }
 
     /// The command, or all that is wrong with it.
-    fn end(self, field: &Field<'_>) -> Vec<Said> {
+    fn end(self, field: &Field<'_>) -> Vec<WordsOrProblem> {
         let Self { words, problems } = self;
         if problems.is_empty() {
             return vec![Ok(Words::of(field, words))];
@@ -105,13 +105,13 @@ const A_NUMBER: &str = "a number, e.g. 0.5";
 const LOAD_KEYS: &[&str] = &["torque_nm", "inertia_kg_m2", "gear", "friction", "pulley", "spring", "stop", "fan"];
 
 /// What hangs on the shaft. A gear comes first: spring and stops stand where the load is behind it.
-fn load(table: &Table<'_>) -> Vec<Said> {
+fn load(table: &Table<'_>) -> Vec<WordsOrProblem> {
     let Some(load) = table.get("load") else { return Vec::new() };
     let load = match load.table("a load", "a table, e.g. { torque_nm = 0.5 }") {
         Ok(load) => load,
         Err(problem) => return vec![Err(problem)],
     };
-    let mut said: Vec<Said> = load.strangers(LOAD_KEYS).into_iter().map(Err).collect();
+    let mut said: Vec<WordsOrProblem> = load.strangers(LOAD_KEYS).into_iter().map(Err).collect();
     for (name, word) in [("torque_nm", "torque"), ("inertia_kg_m2", "inertia")] {
         if let Some(field) = load.get(name) {
             said.push(field.number(A_NUMBER).map(|number| Words::of(&field, format!("load {word} {number}"))));
@@ -139,7 +139,7 @@ fn part_of<'a>(
 }
 
 /// A part of a load whose words are its numbers in this order: those that it needs, and those that may follow.
-fn part(load: &Table<'_>, name: &'static str, needs: &[&str], may: &[&str]) -> Vec<Said> {
+fn part(load: &Table<'_>, name: &'static str, needs: &[&str], may: &[&str]) -> Vec<WordsOrProblem> {
     let names = [needs, may].concat();
     let expected = format!("a table of {}", names.join(", "));
     let Some((field, table)) = part_of(load, name, "a part of a load", &expected) else { return Vec::new() };
@@ -157,7 +157,7 @@ fn part(load: &Table<'_>, name: &'static str, needs: &[&str], may: &[&str]) -> V
     sentence.end(&field)
 }
 
-fn friction(load: &Table<'_>) -> Vec<Said> {
+fn friction(load: &Table<'_>) -> Vec<WordsOrProblem> {
     let expected = "a table, e.g. { coulomb_nm = 0.2, viscous_nm_s = 0.01 }";
     let Some((field, table)) = part_of(load, "friction", "a friction", expected) else { return Vec::new() };
     let table = match table {
@@ -175,7 +175,7 @@ fn friction(load: &Table<'_>) -> Vec<Said> {
     sentence.end(&field)
 }
 
-fn stop(load: &Table<'_>) -> Vec<Said> {
+fn stop(load: &Table<'_>) -> Vec<WordsOrProblem> {
     let expected = "a table, e.g. { range = [-5000, \"max\"], stiffness_nm_rad = 1000 }";
     let Some((field, table)) = part_of(load, "stop", "end stops", expected) else { return Vec::new() };
     let table = match table {
@@ -195,21 +195,21 @@ fn stop(load: &Table<'_>) -> Vec<Said> {
     sentence.end(&field)
 }
 
-fn inputs(table: &Table<'_>) -> Vec<Said> {
+fn inputs(table: &Table<'_>) -> Vec<WordsOrProblem> {
     each(fields(table, "inputs", "a table of levels, e.g. { X0 = true }"), |input| {
         let level = u8::from(input.flag("true or false")?);
         Ok(format!("input {} {level}", word(input)?))
     })
 }
 
-fn switches(table: &Table<'_>) -> Vec<Said> {
+fn switches(table: &Table<'_>) -> Vec<WordsOrProblem> {
     each(fields(table, "switches", "a table of ranges, e.g. { X0 = [-5000, \"max\"] }"), |switch| {
         let [low, high] = bounds(switch)?;
         Ok(format!("switch {} {low} {high}", word(switch)?))
     })
 }
 
-fn rotor(table: &Table<'_>) -> Vec<Said> {
+fn rotor(table: &Table<'_>) -> Vec<WordsOrProblem> {
     let Some(locked) = table.get("rotor_locked") else { return Vec::new() };
     match locked.flag("true or false") {
         Ok(true) => vec![Ok(Words::of(&locked, "rotor lock".into()))],
@@ -218,14 +218,14 @@ fn rotor(table: &Table<'_>) -> Vec<Said> {
     }
 }
 
-fn temperatures(table: &Table<'_>) -> Vec<Said> {
+fn temperatures(table: &Table<'_>) -> Vec<WordsOrProblem> {
     each(fields(table, "temperatures_c", "a table of sensors, e.g. { motor = 95 }"), |sensor| {
         let celsius = sensor.number("degrees Celsius, e.g. 95")?;
         Ok(format!("temperature {} {celsius}", word(sensor)?))
     })
 }
 
-fn faults(table: &Table<'_>) -> Vec<Said> {
+fn faults(table: &Table<'_>) -> Vec<WordsOrProblem> {
     let expected = "a list of components, e.g. [\"hall\"]";
     let components = table.get("faults").map_or(Ok(Vec::new()), |field| field.list(expected).and_then(bounded));
     each(components, |component| {
@@ -234,14 +234,17 @@ fn faults(table: &Table<'_>) -> Vec<Said> {
     })
 }
 
-fn battery(table: &Table<'_>) -> Vec<Said> {
+fn battery(table: &Table<'_>) -> Vec<WordsOrProblem> {
     let Some(battery) = table.get("battery") else { return Vec::new() };
     let state = battery.flag("true or false").map(|connected| if connected { "on" } else { "off" });
     vec![state.map(|state| Words::of(&battery, format!("battery {state}")))]
 }
 
 /// A world command of each field, or what is wrong with it.
-fn each(fields: Result<Vec<Field<'_>>, Problem>, words: impl Fn(&Field<'_>) -> Result<String, Problem>) -> Vec<Said> {
+fn each(
+    fields: Result<Vec<Field<'_>>, Problem>,
+    words: impl Fn(&Field<'_>) -> Result<String, Problem>,
+) -> Vec<WordsOrProblem> {
     match fields {
         Ok(fields) => fields.iter().map(|field| Ok(Words::of(field, words(field)?))).collect(),
         Err(problem) => vec![Err(problem)],

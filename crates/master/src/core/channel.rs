@@ -27,7 +27,7 @@ pub(super) const UPLOAD_BLOCKS_FROM: usize = 256;
 
 /// SDO client channel to one node with its queue: one transfer on the wire, the others wait.
 #[derive(Clone, Debug)]
-pub(super) struct Channel {
+pub(super) struct SdoQueue {
     client: Client,
     /// The server that the client asks, and the default one.
     server: SdoServer,
@@ -69,7 +69,7 @@ pub(super) struct Ended {
     pub(super) outcome: Outcome,
 }
 
-impl Channel {
+impl SdoQueue {
     pub(super) fn new(node: NodeId) -> Self {
         let client = Client::new(node, core::time::Duration::ZERO);
         Self {
@@ -298,9 +298,9 @@ mod tests {
     }
 
     /// A channel that reads 1008h:00.
-    fn reading() -> Channel {
+    fn reading() -> SdoQueue {
         let node = NodeId::new(4).unwrap();
-        let mut channel = Channel::new(node);
+        let mut channel = SdoQueue::new(node);
         let request = Request { node, mux: NAME, transfer: Transfer::Upload, timeout: Duration::from_secs(1) };
         channel.push(Ticket(1), request, false, Instant::ZERO).unwrap();
         channel.poll_transmit().unwrap();
@@ -308,7 +308,7 @@ mod tests {
     }
 
     /// CiA 301, 7.2.4.3.5 and 7.2.4.3.6: initiate upload with or without a size, then segments of 7 bytes with a toggling bit.
-    fn read_in_segments(initiate: [u8; 8], segments: usize) -> (Channel, usize) {
+    fn read_in_segments(initiate: [u8; 8], segments: usize) -> (SdoQueue, usize) {
         let mut channel = reading();
         channel.handle_frame(&frame(initiate), Instant::ZERO);
         let mut most = 0;
@@ -352,7 +352,7 @@ mod tests {
     }
 
     /// What a channel sends after each of these answers, when this is requested of it.
-    fn conversation(channel: &mut Channel, transfer: Transfer, blocks: bool, answers: &[&str]) -> Vec<String> {
+    fn conversation(channel: &mut SdoQueue, transfer: Transfer, blocks: bool, answers: &[&str]) -> Vec<String> {
         let node = NodeId::new(4).unwrap();
         let request = Request { node, mux: NAME, transfer, timeout: Duration::from_secs(1) };
         channel.push(Ticket(1), request, blocks, Instant::ZERO).unwrap();
@@ -371,12 +371,12 @@ mod tests {
     #[test]
     fn a_long_download_goes_in_blocks_where_they_are_allowed_and_again_in_segments_where_they_are_refused() {
         let download = |bytes: usize| Transfer::Download(Payload::new(&vec![0; bytes]));
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         let sent = conversation(&mut channel, download(63), true, &[]);
         assert_eq!(sent, ["604#210810003F000000"], "too short for it");
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         assert_eq!(conversation(&mut channel, download(64), false, &[]), ["604#2108100040000000"], "not allowed");
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         let sent = conversation(&mut channel, download(64), true, &[REFUSED, TAKEN]);
         assert_eq!(sent, ["604#C608100040000000", "604#2108100040000000", "604#0000000000000000"]);
         assert!(channel.take_refusal() && !channel.take_refusal());
@@ -384,17 +384,17 @@ mod tests {
 
     #[test]
     fn an_upload_is_begun_anew_in_blocks_where_a_long_value_is_declared_and_as_before_where_they_are_refused() {
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         let sent = conversation(&mut channel, Transfer::Upload, true, &["584#41081000FF000000"]);
         assert_eq!(sent, ["604#4008100000000000", "604#6000000000000000"], "255 bytes");
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         let declared = "584#4108100000010000";
         let sent = conversation(&mut channel, Transfer::Upload, true, &[declared, REFUSED, declared]);
         let begin = ["604#4008100000000000", "604#8008100000000008", "604#A40810007F000000"];
         assert_eq!(sent, [&begin[..], &["604#4008100000000000", "604#6000000000000000"]].concat());
         assert!(channel.poll_finished().is_none(), "it goes on");
         // Another abort is the node's answer.
-        let mut channel = Channel::new(NodeId::new(4).unwrap());
+        let mut channel = SdoQueue::new(NodeId::new(4).unwrap());
         conversation(&mut channel, Transfer::Upload, true, &[declared, "584#8008100000000008"]);
         assert_eq!(channel.poll_finished().unwrap().outcome, Err(Failure::Aborted(AbortCode::GENERAL)));
     }

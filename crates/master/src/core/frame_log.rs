@@ -20,12 +20,12 @@ pub struct LoggedFrame {
 /// All logs that are being kept.
 #[derive(Clone, Debug, Default)]
 pub struct FrameLogs {
-    logs: Vec<FrameLog>,
+    logs: Vec<FilteredLog>,
     next: u64,
 }
 
 #[derive(Clone, Debug)]
-struct FrameLog {
+struct FilteredLog {
     token: u64,
     ids: Vec<u16>,
     frames: VecDeque<LoggedFrame>,
@@ -39,7 +39,7 @@ impl FrameLogs {
     pub fn open(&mut self, ids: &[u16], capacity: usize) -> u64 {
         self.next += 1;
         let (token, ids, frames) = (self.next, ids.to_vec(), VecDeque::with_capacity(capacity));
-        self.logs.push(FrameLog { token, ids, frames, capacity, lost: 0 });
+        self.logs.push(FilteredLog { token, ids, frames, capacity, lost: 0 });
         self.next
     }
 

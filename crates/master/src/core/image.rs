@@ -32,7 +32,7 @@ pub enum RpdoTrigger {
 /// than its mapping is not taken over (CiA 301, 7.2.2.5). An unsent RPDO is overwritten by its newer value.
 #[derive(Clone, Debug)]
 pub struct ProcessImage {
-    tpdos: Vec<Tpdo>,
+    tpdos: Vec<TpdoImage>,
     rpdos: Vec<Rpdo>,
     /// Position in `tpdos` by identifier; `NONE` for most.
     by_id: Vec<u16>,
@@ -48,7 +48,7 @@ const NONE: u16 = u16::MAX;
 
 /// A PDO keeps its position; one that is no longer used has no identifier.
 #[derive(Clone, Debug)]
-struct Tpdo {
+struct TpdoImage {
     node: NodeId,
     number: PdoNumber,
     /// Counts its mappings, so that a [`ImagePlace`] in an old one finds nothing.
@@ -100,14 +100,14 @@ impl ProcessImage {
     /// already.
     pub fn set_tpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap) {
         let bytes = map.bytes();
-        let unchanged = |pdo: &Tpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, Some(id), &map);
+        let unchanged = |pdo: &TpdoImage| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, Some(id), &map);
         if self.tpdos.iter().any(unchanged) {
             return;
         }
         let before = self.tpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.tpdos[position].generation.wrapping_add(1));
         let id = Some(id);
-        let new = Tpdo { node, number, generation, id, map, bytes, data: 0, at: None, cycle: 0, too_short: 0 };
+        let new = TpdoImage { node, number, generation, id, map, bytes, data: 0, at: None, cycle: 0, too_short: 0 };
         match before {
             Some(position) => self.tpdos[position] = new,
             None => self.tpdos.push(new),
@@ -196,7 +196,7 @@ impl ProcessImage {
         self.tpdo(node, number).map_or(0, |pdo| pdo.too_short)
     }
 
-    fn tpdo(&self, node: NodeId, number: PdoNumber) -> Option<&Tpdo> {
+    fn tpdo(&self, node: NodeId, number: PdoNumber) -> Option<&TpdoImage> {
         self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.id.is_some())
     }
 

@@ -49,7 +49,7 @@ pub(crate) use supervision::{Cadence, CycleRules, WatchId};
 pub use twins::Twins;
 
 use answers::Answers;
-use channel::Channel;
+use channel::SdoQueue;
 use cycle::SyncClock;
 use event::Events;
 use presence::Presence;
@@ -109,7 +109,7 @@ pub struct Core {
 #[derive(Clone, Debug)]
 struct Member {
     facts: NodeFacts,
-    channel: Channel,
+    channel: SdoQueue,
     answers: Answers,
 }
 
@@ -123,7 +123,7 @@ impl Core {
     /// A master that knows nothing of any node.
     pub fn new() -> Self {
         let member =
-            |node| Member { facts: NodeFacts::default(), channel: Channel::new(node), answers: Answers::default() };
+            |node| Member { facts: NodeFacts::default(), channel: SdoQueue::new(node), answers: Answers::default() };
         Self {
             now: Instant::ZERO,
             members: NodeId::all().map(member).collect(),

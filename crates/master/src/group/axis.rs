@@ -20,7 +20,7 @@ const KEPT: usize = 8;
 #[derive(Debug)]
 pub(super) struct GroupAxis {
     pub(super) drive: CyclicDrive,
-    following: Following,
+    following: FollowedSetPoints,
     /// The newest set-points, in turns, newest first.
     asked: [f64; KEPT],
     /// How far the shaft was from its set-point in the last cycle, in turns.
@@ -31,7 +31,7 @@ pub(super) struct GroupAxis {
 
 /// What its drive follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Following {
+enum FollowedSetPoints {
     /// The drive closes its position loop.
     Positions,
     /// The drive follows speeds; the position loop is closed here.
@@ -40,7 +40,8 @@ enum Following {
 
 impl GroupAxis {
     pub(super) fn new(drive: CyclicDrive, claim: Claim) -> Self {
-        let following = if drive.set_point().is_some() { Following::Positions } else { Following::Speeds };
+        let following =
+            if drive.set_point().is_some() { FollowedSetPoints::Positions } else { FollowedSetPoints::Speeds };
         Self { drive, following, asked: [0.0; KEPT], error_turns: None, _claim: claim }
     }
 
@@ -60,8 +61,8 @@ impl GroupAxis {
         before: &CyclicState,
     ) -> CyclicState {
         let demand = match self.following {
-            Following::Positions => Demand::Position(Angle::Turns(point.position_turns)),
-            Following::Speeds => Demand::Velocity(self.speed(point, limits, before)),
+            FollowedSetPoints::Positions => Demand::Position(Angle::Turns(point.position_turns)),
+            FollowedSetPoints::Speeds => Demand::Velocity(self.speed(point, limits, before)),
         };
         self.asked.rotate_right(1);
         self.asked[0] = point.position_turns;

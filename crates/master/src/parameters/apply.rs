@@ -70,12 +70,12 @@ impl Drive {
         for (position, step) in plan.steps.iter().enumerate() {
             progress(position + 1, step);
             let (why, written) = match self.take(step).await {
-                Taken::Yes => continue,
-                Taken::As(found) => {
+                StepResult::Yes => continue,
+                StepResult::As(found) => {
                     rounded.push(Rounded { object: step.object, asked: step.value.clone(), found });
                     continue;
                 }
-                Taken::No { why, written } => (why, written),
+                StepResult::No { why, written } => (why, written),
             };
             let done = &plan.steps[..position + usize::from(written)];
             let undone = self.go_back(plan, done).await;
@@ -96,28 +96,32 @@ impl Drive {
         Ok(Ok(Applied { writes: plan.steps.len(), rounded, displaced }))
     }
 
-    async fn take(&self, step: &ParameterStep) -> Taken {
+    async fn take(&self, step: &ParameterStep) -> StepResult {
         let node = self.node();
         match node.download(step.object, &step.value).await {
             Ok(()) => {}
             // Some devices map regardless and have no such bit: what follows shows whether this one does.
-            Err(Error::Aborted { .. }) if step.purpose == Purpose::SwitchOff => return Taken::Yes,
+            Err(Error::Aborted { .. }) if step.purpose == Purpose::SwitchOff => return StepResult::Yes,
             Err(error) => {
                 // After silence it is not known.
                 let written = error.abort().is_none();
-                return Taken::No { why: Why::Failed(error), written };
+                return StepResult::No { why: Why::Failed(error), written };
             }
         }
         match node.upload(step.object).await {
-            Ok(payload) if same(step.object, &step.value, payload.as_bytes()) => Taken::Yes,
-            Ok(_) if step.purpose == Purpose::SwitchOff => Taken::Yes,
+            Ok(payload) if same(step.object, &step.value, payload.as_bytes()) => StepResult::Yes,
+            Ok(_) if step.purpose == Purpose::SwitchOff => StepResult::Yes,
             Ok(payload) => {
                 let found = payload.as_bytes().to_vec();
                 // An identifier or a mapping that is nearly right is wrong; a speed is not.
                 let exact = matches!(step.object.index, 0x1000..=0x1FFF) && !is_time(step.object);
-                if exact { Taken::No { why: Why::ReadsBack { found }, written: true } } else { Taken::As(found) }
+                if exact {
+                    StepResult::No { why: Why::ReadsBack { found }, written: true }
+                } else {
+                    StepResult::As(found)
+                }
             }
-            Err(error) => Taken::No { why: Why::Failed(error), written: true },
+            Err(error) => StepResult::No { why: Why::Failed(error), written: true },
         }
     }
 
@@ -144,7 +148,7 @@ const fn is_time(object: Mux) -> bool {
         || matches!(object.index, 0x1400..=0x15FF | 0x1800..=0x19FF) && matches!(object.sub_index, 3 | 5)
 }
 
-enum Taken {
+enum StepResult {
     Yes,
     As(Vec<u8>),
     No {

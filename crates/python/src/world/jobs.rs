@@ -13,13 +13,13 @@ pub(crate) type Job = Pin<Box<dyn Future<Output = ()> + Send>>;
 /// The jobs of one world, in the order in which they were begun.
 #[derive(Default)]
 pub(crate) struct Jobs {
-    running: Vec<Running>,
+    running: Vec<RunningJob>,
     begun: u64,
     /// A master is in the world. It is shared with every copy, so there must be none.
     has_master: bool,
 }
 
-struct Running {
+struct RunningJob {
     number: u64,
     /// Whose it is.
     owner: usize,
@@ -35,7 +35,7 @@ impl Jobs {
     /// Begins a job of this owner; returns its number.
     pub(crate) fn begin(&mut self, owner: usize, job: Job) -> u64 {
         self.begun += 1;
-        self.running.push(Running { number: self.begun, owner, task: Task::new(job) });
+        self.running.push(RunningJob { number: self.begun, owner, task: Task::new(job) });
         self.begun
     }
 

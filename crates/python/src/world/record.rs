@@ -20,7 +20,7 @@ const WRITE_PERIOD: Duration = Duration::from_millis(100);
 #[derive(Default)]
 pub(super) struct Recordings {
     file: Option<Writing>,
-    trail: Option<Following>,
+    trail: Option<PeriodicTrail>,
     /// What the world's recorder samples, in its order.
     columns: Vec<Column>,
     next_at: Instant,
@@ -36,7 +36,7 @@ struct Writing {
 }
 
 /// A trail, and how often it wants a sample.
-struct Following {
+struct PeriodicTrail {
     trail: Trail,
     period: Duration,
 }
@@ -80,7 +80,7 @@ impl Recordings {
 
     /// Keeps the last of what moves from now on; what was kept before is lost.
     pub(super) fn keep_trail(&mut self, world: &mut sim::World, keep: Duration, period: Duration) {
-        self.trail = Some(Following { trail: Trail::new(keep, period), period });
+        self.trail = Some(PeriodicTrail { trail: Trail::new(keep, period), period });
         self.follow(world);
     }
 
@@ -100,7 +100,7 @@ impl Recordings {
         if self.file.is_some() {
             return;
         }
-        if let Some(Following { period, .. }) = self.trail {
+        if let Some(PeriodicTrail { period, .. }) = self.trail {
             self.look(world);
             let signals: Vec<Signal> = Trail::signals().collect();
             self.sample(world, &signals, period);
@@ -136,7 +136,7 @@ impl Recordings {
     fn look(&mut self, world: &mut sim::World) {
         self.next_at = world.now() + WRITE_PERIOD;
         let Some(recorded) = world.take_recorded() else { return };
-        if let Some(Following { trail, .. }) = &mut self.trail {
+        if let Some(PeriodicTrail { trail, .. }) = &mut self.trail {
             trail.take(&self.columns, recorded.rows());
         }
         if let Some(writing) = self.file.as_mut().filter(|writing| writing.failed.is_none()) {

@@ -22,7 +22,7 @@ const DEEPEST: usize = 8;
 
 /// A line with its place in the file and its indentation.
 #[derive(Clone, Debug)]
-struct Line {
+struct ScriptLine {
     number: usize,
     indent: usize,
     text: String,
@@ -31,7 +31,7 @@ struct Line {
 /// Steps with a name, for one or several places.
 struct Definition {
     parameters: Vec<String>,
-    lines: Vec<Line>,
+    lines: Vec<ScriptLine>,
 }
 
 /// What went wrong, and in which line if that is known.
@@ -74,17 +74,17 @@ pub(crate) fn play(bench: &mut Bench, name: &str, text: &str, strict: bool) -> R
 }
 
 /// The lines that do something.
-fn lines(text: &str) -> Vec<Line> {
+fn lines(text: &str) -> Vec<ScriptLine> {
     let line = |(number, line): (usize, &str)| {
         let text = line.trim();
         let indent = line.len() - line.trim_start().len();
-        (!text.is_empty() && !text.starts_with('#')).then(|| Line { number, indent, text: text.into() })
+        (!text.is_empty() && !text.starts_with('#')).then(|| ScriptLine { number, indent, text: text.into() })
     };
     (1..).zip(text.lines()).filter_map(line).collect()
 }
 
 impl Player<'_> {
-    fn play(&mut self, mut lines: &[Line]) -> Result<(), Trouble> {
+    fn play(&mut self, mut lines: &[ScriptLine]) -> Result<(), Trouble> {
         while let Some((line, rest)) = lines.split_first() {
             let inner = rest.iter().take_while(|next| next.indent > line.indent).count();
             let (block, after) = rest.split_at(inner);
@@ -96,12 +96,12 @@ impl Player<'_> {
     }
 
     /// In a conversation: that nothing was heard that is not listed.
-    fn end(&self, lines: &[Line]) -> Result<(), Trouble> {
+    fn end(&self, lines: &[ScriptLine]) -> Result<(), Trouble> {
         let line = lines.last().map(|line| line.number);
         self.expect_silence().map_err(|what| Trouble { line, what })
     }
 
-    fn line(&mut self, line: &Line, block: &[Line], after: &[Line]) -> Result<(), Trouble> {
+    fn line(&mut self, line: &ScriptLine, block: &[ScriptLine], after: &[ScriptLine]) -> Result<(), Trouble> {
         let (word, rest) = line.text.split_once(' ').unwrap_or((&line.text, ""));
         match word {
             "def" => {
@@ -135,7 +135,7 @@ impl Player<'_> {
     }
 
     /// Does the lines of a definition for each row below, or for each number of `NAME 1..20`.
-    fn each(&mut self, name: &str, rows: &[Line]) -> Result<(), Trouble> {
+    fn each(&mut self, name: &str, rows: &[ScriptLine]) -> Result<(), Trouble> {
         if let Some((name, range)) = name.split_once(' ') {
             let (first, last) = range.split_once("..").ok_or("expected a range such as 1..20")?;
             let (first, last) = (self.value(first)? as i64, self.value(last)? as i64);

@@ -181,7 +181,7 @@ struct Got<'a> {
     analogue: BTreeMap<String, i64>,
     brake: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    output_shaft: Option<Output>,
+    output_shaft: Option<OutputAnswer>,
     #[serde(skip_serializing_if = "Option::is_none")]
     damage: Option<&'a str>,
     /// The machine that it moves with others.
@@ -207,7 +207,7 @@ struct Got<'a> {
 
 /// The shaft behind a reducer.
 #[derive(Serialize)]
-struct Output {
+struct OutputAnswer {
     angle_deg: f64,
     torque_nm: f64,
     most_nm: f64,
@@ -216,7 +216,7 @@ struct Output {
     slip_deg: f64,
 }
 
-impl From<OutputShaft> for Output {
+impl From<OutputShaft> for OutputAnswer {
     fn from(shaft: OutputShaft) -> Self {
         let OutputShaft { angle_rad, torque_nm, most_nm, overloads, jumps, slip_rad } = shaft;
         let (angle_deg, slip_deg) = (angle_rad.to_degrees(), slip_rad.to_degrees());
@@ -257,7 +257,7 @@ fn get(world: &mut World, place: Place, service: Service) -> Result<String, Comm
         outputs: levels(report.outputs),
         analogue: analogue.into_iter().map(|(mux, value)| (format!("{mux:X}"), value)).collect(),
         brake: brake_text(report.brake),
-        output_shaft: report.output.map(Output::from),
+        output_shaft: report.output.map(OutputAnswer::from),
         damage: report.damage,
         body: world.body_of(place),
         motor_c: report.motor_c,

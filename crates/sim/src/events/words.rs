@@ -43,10 +43,10 @@ impl fmt::Display for EventKind {
             Self::State { from: None, to } => write!(f, "state {}", to.name()),
             Self::State { from: Some(from), to } => write!(f, "state {} (was {})", to.name(), from.name()),
             Self::Mode(mode) => write!(f, "mode {}", mode_name(*mode)),
-            Self::Fault { code, row } => write!(f, "fault {code:04X}h{}", Named(*row)),
-            Self::FaultReset { code, row } => write!(f, "fault {code:04X}h is gone{}", Named(*row)),
+            Self::Fault { code, row } => write!(f, "fault {code:04X}h{}", FaultName(*row)),
+            Self::FaultReset { code, row } => write!(f, "fault {code:04X}h is gone{}", FaultName(*row)),
             Self::Emcy { emcy, row: None } => write!(f, "EMCY {:04X}h, {}", emcy.code.0, emcy.code.class()),
-            Self::Emcy { emcy, row } => write!(f, "EMCY {:04X}h{}", emcy.code.0, Named(*row)),
+            Self::Emcy { emcy, row } => write!(f, "EMCY {:04X}h{}", emcy.code.0, FaultName(*row)),
             Self::TargetReached => f.write_str("target reached"),
             Self::InternalLimit(true) => f.write_str("an internal limit is active"),
             Self::InternalLimit(false) => f.write_str("no internal limit is active any more"),
@@ -73,9 +73,9 @@ impl fmt::Display for EventKind {
 }
 
 /// The name of a fault behind its code.
-struct Named(Option<&'static FaultRow>);
+struct FaultName(Option<&'static FaultRow>);
 
-impl fmt::Display for Named {
+impl fmt::Display for FaultName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.map_or(Ok(()), |row| write!(f, ", {}", row.name))
     }

@@ -21,17 +21,17 @@ const NEVER: u64 = u64::MAX;
 
 /// A world's values for its host. A clone is another handle to the same world.
 #[derive(Clone, Debug)]
-pub struct LiveValues(Arc<Shared>);
+pub struct LiveValues(Arc<LiveShared>);
 
 #[derive(Debug)]
-struct Shared {
+struct LiveShared {
     /// When the earliest sample is due in ns of the world's time: what the world looks at when its time passes.
     next_at: AtomicU64,
-    state: Mutex<State>,
+    state: Mutex<LiveState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct LiveState {
     feeds: Vec<Feed>,
     next_token: u64,
     /// The host's time less the world's, ns.
@@ -84,10 +84,10 @@ impl PartialEq for LiveValues {
 
 impl LiveValues {
     pub(crate) fn new() -> Self {
-        Self(Arc::new(Shared { next_at: AtomicU64::new(NEVER), state: Mutex::default() }))
+        Self(Arc::new(LiveShared { next_at: AtomicU64::new(NEVER), state: Mutex::default() }))
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, LiveState> {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -131,7 +131,7 @@ impl LiveValues {
         Subscription { of: self.clone(), token, width }
     }
 
-    fn note_next(&self, state: &State) {
+    fn note_next(&self, state: &LiveState) {
         let next = state.feeds.iter().map(|feed| feed.next_at.as_nanos()).min();
         self.0.next_at.store(next.unwrap_or(NEVER), Ordering::Release);
     }

@@ -6,7 +6,7 @@
 use can::Instant;
 
 use super::World;
-use super::crew::{Errand, Found, Job, OnBus};
+use super::crew::{Errand, Job, JobResult, OnBus};
 use super::member::{Member, Vacant};
 
 /// Fewer drives than that are not worth several threads: with ten control periods each it is some 12 us, and a hand-over takes 3.
@@ -36,7 +36,7 @@ impl World {
         batch.clear();
         let is_drive = |i: usize| matches!(self.members[i], Member::Drive { .. });
         let chosen = (0..self.members.len()).filter(|i| wanted(self, *i) && is_drive(*i) && !self.is_tied(*i));
-        batch.extend(chosen.map(|i| (i, Found::Unknown)));
+        batch.extend(chosen.map(|i| (i, JobResult::Unknown)));
         if batch.len() < WORTH_IT {
             batch.clear();
         } else {
@@ -47,7 +47,7 @@ impl World {
                 member: std::mem::replace(&mut members[*station], Member::Gone(Vacant)),
                 on_bus: is_direct
                     .then(|| OnBus { bitrate: bus.bitrate_of(*station), has_room: bus.has_room(*station) }),
-                found: Found::Unknown,
+                found: JobResult::Unknown,
             });
             crew.work((job, *now), batch.len(), errands);
             let mut found = batch.iter_mut().map(|(_, found)| found);
@@ -60,14 +60,14 @@ impl World {
     }
 
     /// After a job with station `i` on another thread: like [`serve`](Self::serve), without a look at a drive that wants nothing.
-    pub(super) fn serve_found(&mut self, i: usize, found: Found) {
+    pub(super) fn serve_found(&mut self, i: usize, found: JobResult) {
         match found {
-            Found::Quiet(due) => self.due.set(i, due),
-            Found::Sends(frame) => {
+            JobResult::Quiet(due) => self.due.set(i, due),
+            JobResult::Sends(frame) => {
                 self.bus.offer(i, frame, self.now);
                 self.serve(i);
             }
-            Found::Unknown => self.serve(i),
+            JobResult::Unknown => self.serve(i),
         }
     }
 
@@ -81,17 +81,17 @@ impl World {
 
 impl Member {
     /// A job for this station alone, and what it wants then.
-    pub(super) fn work(&mut self, job: Job, now: Instant, on_bus: Option<OnBus>) -> Found {
-        let Self::Drive { drive, .. } = self else { return Found::Unknown };
+    pub(super) fn work(&mut self, job: Job, now: Instant, on_bus: Option<OnBus>) -> JobResult {
+        let Self::Drive { drive, .. } = self else { return JobResult::Unknown };
         if job == Job::Advance {
             drive.advance(now);
-            return Found::Unknown;
+            return JobResult::Unknown;
         }
         drive.handle_timeout(now);
-        let Some(on_bus) = on_bus.filter(|on_bus| drive.bitrate() == on_bus.bitrate) else { return Found::Unknown };
+        let Some(on_bus) = on_bus.filter(|on_bus| drive.bitrate() == on_bus.bitrate) else { return JobResult::Unknown };
         match on_bus.has_room.then(|| drive.poll_transmit()).flatten() {
-            Some(frame) => Found::Sends(frame),
-            None => Found::Quiet(drive.poll_timeout().unwrap_or(Instant::FAR_FUTURE)),
+            Some(frame) => JobResult::Sends(frame),
+            None => JobResult::Quiet(drive.poll_timeout().unwrap_or(Instant::FAR_FUTURE)),
         }
     }
 }

@@ -40,7 +40,7 @@ pub(super) struct Errand {
     pub(super) member: Member,
     /// How it is joined to the bus; `None` if its frames are not taken directly.
     pub(super) on_bus: Option<OnBus>,
-    pub(super) found: Found,
+    pub(super) found: JobResult,
 }
 
 /// How a station is joined to the bus.
@@ -52,7 +52,7 @@ pub(super) struct OnBus {
 
 /// What a station wants when the job is done.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Found {
+pub(super) enum JobResult {
     /// It has to be asked.
     Unknown,
     /// Nothing until then.
@@ -70,11 +70,11 @@ pub(super) struct Crew {
 struct Workers {
     /// A child of `fork` has the handles of its parent's threads, and none of the threads.
     process: u32,
-    shared: Arc<Shared>,
+    shared: Arc<CrewShared>,
     handles: Vec<JoinHandle<()>>,
 }
 
-struct Shared {
+struct CrewShared {
     threads: usize,
     /// A share for each thread, one behind the other.
     parcels: Vec<Parcel>,
@@ -158,7 +158,7 @@ impl Workers {
             let contents = Contents { job: Job::Advance, now: Instant::ZERO, errands: Vec::new(), panicked: false };
             Parcel { open: AtomicBool::new(false), contents: Mutex::new(contents) }
         };
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(CrewShared {
             threads,
             parcels: (0..threads * PARCELS_EACH).map(parcel).collect(),
             left: AtomicUsize::new(0),
@@ -190,7 +190,7 @@ impl Drop for Workers {
     }
 }
 
-impl Shared {
+impl CrewShared {
     fn hand_out(&self, parcels: impl Iterator<Item = usize> + Clone) {
         self.left.store(parcels.clone().count(), Ordering::Relaxed);
         parcels.for_each(|number| self.parcels[number].open.store(true, Ordering::Release));

@@ -31,12 +31,12 @@ pub enum BusThreadError {
 }
 
 /// What the thread does with its bus.
-type Work = Box<dyn FnOnce(AnyBus, WallClock) -> Pin<Box<dyn Future<Output = ()>>> + Send>;
+type BusJob = Box<dyn FnOnce(AnyBus, WallClock) -> Pin<Box<dyn Future<Output = ()>>> + Send>;
 
 /// A bus in a thread of its own, which runs in real time ([`realtime::enter`]) with the thread of its clock and no other: what the
 /// caller computes, prints and waits for holds up no frame.
 pub struct BusThread {
-    work: oneshot::Sender<Work>,
+    work: oneshot::Sender<BusJob>,
 }
 
 impl fmt::Debug for BusThread {
@@ -74,7 +74,7 @@ impl BusThread {
         let (over, is_over) = oneshot::channel::<()>();
         let (reported, mut notes) = mpsc::channel(NOTES_WAITING);
         let (ended, mut end) = oneshot::channel();
-        let work: Work = Box::new(move |mut bus, clock| {
+        let work: BusJob = Box::new(move |mut bus, clock| {
             Box::pin(async move {
                 let tell = |at, note: &Note| drop(reported.try_send((at, note.clone())));
                 let run = run_station(&mut bus, &mut station, &clock, &wakeup, is_over, tell);
@@ -104,7 +104,11 @@ impl BusThread {
     }
 }
 
-fn serve(spec: &BusSpec, reported: oneshot::Sender<Result<WallClock, BusThreadError>>, given: oneshot::Receiver<Work>) {
+fn serve(
+    spec: &BusSpec,
+    reported: oneshot::Sender<Result<WallClock, BusThreadError>>,
+    given: oneshot::Receiver<BusJob>,
+) {
     let entered = realtime::enter().and_then(|()| WallClock::start_in_real_time());
     let clock = match entered {
         Ok(clock) => clock,

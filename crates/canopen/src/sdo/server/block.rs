@@ -2,7 +2,7 @@
 
 use can::{Frame, Instant};
 
-use super::{Confirm, Phase, Room, Server, Source, Taken, Transfer, Write, check_length};
+use super::{BlockUploadPhase, Confirm, Room, Server, SubBlockFrame, Transfer, UploadSource, Write, check_length};
 use crate::od::{Dictionary, RowFacts, Slot, Storage, View};
 use crate::sdo::block::wire::{ABORT, Acknowledgement, End, Reply, Request, Segment};
 use crate::sdo::block::{Receiver, Sender, Sent, is_block_size};
@@ -12,13 +12,13 @@ use crate::{AbortCode, Mux};
 impl Server {
     /// True while segments of an upload are to be sent: [`take_segment`](Self::take_segment).
     pub const fn has_segment(&self) -> bool {
-        matches!(&self.transfer, Transfer::BlockUpload { sender, phase: Phase::Segments, .. } if sender.has_segment())
+        matches!(&self.transfer, Transfer::BlockUpload { sender, phase: BlockUploadPhase::Segments, .. } if sender.has_segment())
     }
 
     /// Takes the next segment of an upload, after the reply if one waits.
     pub fn take_segment(&mut self, values: &View<'_>) -> Option<[u8; LENGTH]> {
         match &mut self.transfer {
-            Transfer::BlockUpload { source, sender, phase: Phase::Segments, .. } => {
+            Transfer::BlockUpload { source, sender, phase: BlockUploadPhase::Segments, .. } => {
                 sender.segment(source.bytes(self.number, values))
             }
             _ => None,
@@ -42,7 +42,7 @@ impl Server {
             Some(Request::StartUpload) => self.start_block_upload(now),
             Some(Request::Acknowledge(confirmation)) => self.take_confirmation(confirmation, now),
             Some(Request::EndUpload) => match self.transfer {
-                Transfer::BlockUpload { phase: Phase::Ended, .. } => self.end(),
+                Transfer::BlockUpload { phase: BlockUploadPhase::Ended, .. } => self.end(),
                 // It answers nothing that was asked: once more, say, as a wire may repeat it.
                 Transfer::None => {}
                 _ => self.unexpected(),
@@ -78,15 +78,15 @@ impl Server {
             return self.initiate_upload(mux, values, now);
         }
         let source = if facts.summary.is_long() {
-            Source::of_long(self.number, slot, values)
+            UploadSource::of_long(self.number, slot, values)
         } else {
-            Source::Cell(values.raw(slot).to_le_bytes(), facts.summary.size())
+            UploadSource::Cell(values.raw(slot).to_le_bytes(), facts.summary.size())
         };
         let length = source.bytes(self.number, &values.view()).len();
         let Some(sender) = Sender::new(length, checksum, block_size) else {
             return self.refuse(mux, AbortCode::INVALID_BLOCK_SIZE);
         };
-        self.transfer = Transfer::BlockUpload { mux, source, sender, phase: Phase::Agreed };
+        self.transfer = Transfer::BlockUpload { mux, source, sender, phase: BlockUploadPhase::Agreed };
         self.restart_timeout(now);
         // That it could form one is said to a client only that can, too: some look at this bit alone.
         self.answer_block(Reply::InitiateUpload { mux, checksum, size: Some(length as u32) });
@@ -94,19 +94,21 @@ impl Server {
 
     fn start_block_upload(&mut self, now: Instant) {
         match &mut self.transfer {
-            Transfer::BlockUpload { phase: phase @ Phase::Agreed, sender, .. } => {
-                *phase = Phase::Segments;
+            Transfer::BlockUpload { phase: phase @ BlockUploadPhase::Agreed, sender, .. } => {
+                *phase = BlockUploadPhase::Segments;
                 let wire_time_ns = sender.wire_time_ns();
                 self.allow(wire_time_ns, now);
             }
             // Once more, as a wire may repeat it.
-            Transfer::BlockUpload { phase: Phase::Segments, sender, .. } if sender.confirmed_bytes() == 0 => {}
+            Transfer::BlockUpload { phase: BlockUploadPhase::Segments, sender, .. }
+                if sender.confirmed_bytes() == 0 => {}
             _ => self.unexpected(),
         }
     }
 
     fn take_confirmation(&mut self, confirmation: Acknowledgement, now: Instant) {
-        let Transfer::BlockUpload { mux, sender, phase: phase @ Phase::Segments, .. } = &mut self.transfer else {
+        let Transfer::BlockUpload { mux, sender, phase: phase @ BlockUploadPhase::Segments, .. } = &mut self.transfer
+        else {
             return self.unexpected();
         };
         match sender.confirm(confirmation) {
@@ -115,7 +117,7 @@ impl Server {
                 self.allow(wire_time_ns, now);
             }
             Ok(Sent::All) => {
-                *phase = Phase::Ended;
+                *phase = BlockUploadPhase::Ended;
                 let end = sender.end();
                 self.restart_timeout(now);
                 self.answer_block(Reply::EndUpload(end));
@@ -156,7 +158,7 @@ impl Server {
         frame: &Frame,
         values: &mut Dictionary<S>,
         now: Instant,
-    ) -> Taken {
+    ) -> SubBlockFrame {
         let raw = frame.padded();
         match &mut self.transfer {
             // No segment has this number: the client gives up.
@@ -174,12 +176,12 @@ impl Server {
             }
             _ => return self.take_no_segments(),
         }
-        Taken::Here(None)
+        SubBlockFrame::Here(None)
     }
 
-    fn take_no_segments(&mut self) -> Taken {
+    fn take_no_segments(&mut self) -> SubBlockFrame {
         self.takes_segments = false;
-        Taken::Another
+        SubBlockFrame::Another
     }
 
     fn take_segment_of_block<S: Storage>(&mut self, raw: &[u8; LENGTH], values: &mut Dictionary<S>, now: Instant) {
@@ -197,7 +199,7 @@ impl Server {
     }
 
     /// After the last segment: the end of the data, or another request.
-    fn end_block_download<S: Storage>(&mut self, raw: &[u8; LENGTH], values: &mut Dictionary<S>) -> Taken {
+    fn end_block_download<S: Storage>(&mut self, raw: &[u8; LENGTH], values: &mut Dictionary<S>) -> SubBlockFrame {
         let transfer = core::mem::replace(&mut self.transfer, Transfer::None);
         self.end();
         let (
@@ -205,13 +207,13 @@ impl Server {
             Transfer::BlockDownload { mux, slot, facts, mut room, declared, receiver },
         ) = (Request::parse(raw), transfer)
         else {
-            return Taken::Another;
+            return SubBlockFrame::Another;
         };
         match finish(&receiver, &mut room, declared, end, values.staging_mut(self.number)) {
-            Ok(raw) => Taken::Here(Some(Write { slot, raw, facts, mux, confirm: Confirm::Block })),
+            Ok(raw) => SubBlockFrame::Here(Some(Write { slot, raw, facts, mux, confirm: Confirm::Block })),
             Err(code) => {
                 self.refuse(mux, code);
-                Taken::Here(None)
+                SubBlockFrame::Here(None)
             }
         }
     }

@@ -91,7 +91,7 @@ struct PdoLine {
     node: u8,
     pdo: String,
     bytes: String,
-    values: Vec<Field>,
+    values: Vec<MappedField>,
     #[serde(skip)]
     stamp: String,
     #[serde(skip)]
@@ -99,7 +99,7 @@ struct PdoLine {
 }
 
 #[derive(Debug, Serialize)]
-struct Field {
+struct MappedField {
     object: String,
     name: Option<&'static str>,
     #[serde(flatten)]
@@ -195,7 +195,7 @@ impl PdoLine {
             let bytes = raw.to_le_bytes();
             let length = usize::from(record.bits).div_ceil(8).min(bytes.len());
             let row = model.map_or_else(|| master::decode::common_row(record.mux), |model| model.row(record.mux));
-            Field {
+            MappedField {
                 object: record.mux.to_string(),
                 name: Value::new(record.mux, &bytes[..length], model).name(),
                 value: decode(model, row, &bytes[..length]),

@@ -8,7 +8,7 @@ use master::decode::{common_name, common_row};
 use master::{Drive, Error};
 use serde::Serialize;
 
-use crate::command::repeat::{Pace, Repeat, period};
+use crate::command::repeat::{Repeat, Ticker, period};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::{Format, Report};
@@ -94,7 +94,7 @@ impl Watch {
             context.progress.clear();
         }
         let looks = async {
-            let mut pace = Pace::new(&context.network, self.every);
+            let mut pace = Ticker::new(&context.network, self.every);
             let mut looks = 0;
             while times.is_none_or(|times| looks < times) {
                 pace.wait().await;

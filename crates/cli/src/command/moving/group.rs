@@ -64,7 +64,7 @@ enum GroupAction {
 struct Move {
     /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
-    words: Vec<Word>,
+    words: Vec<Argument>,
     /// Duration of the move (default: the shortest within the limits)
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     within: Option<Duration>,
@@ -129,16 +129,16 @@ struct GroupOptions {
 
 /// A machine file, or where an axis is to go.
 #[derive(Clone, Debug)]
-enum Word {
+enum Argument {
     File(PathBuf),
     Target(NodeId, Angle),
 }
 
-fn word(text: &str) -> Result<Word, String> {
+fn word(text: &str) -> Result<Argument, String> {
     match text.contains('=') {
-        true => target(text).map(|(node, angle)| Word::Target(node, angle)),
+        true => target(text).map(|(node, angle)| Argument::Target(node, angle)),
         false if Path::new(text).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => {
-            Ok(Word::File(text.into()))
+            Ok(Argument::File(text.into()))
         }
         false => Err("expected a machine file, FILE.toml, or NODE=POSITION, e.g. 1=90deg".into()),
     }
@@ -278,11 +278,15 @@ impl Planned<'_> {
 
 impl Move {
     fn files(&self) -> Vec<&Path> {
-        self.words.iter().filter_map(|word| if let Word::File(path) = word { Some(&**path) } else { None }).collect()
+        self.words
+            .iter()
+            .filter_map(|word| if let Argument::File(path) = word { Some(&**path) } else { None })
+            .collect()
     }
 
     fn asked(&self) -> GroupMove {
-        let target = |word: &Word| if let Word::Target(node, angle) = word { Some((*node, *angle)) } else { None };
+        let target =
+            |word: &Argument| if let Argument::Target(node, angle) = word { Some((*node, *angle)) } else { None };
         let targets = self.words.iter().filter_map(target).collect();
         GroupMove { targets, within: self.within, ..self.options.asked() }
     }

@@ -65,12 +65,12 @@ pub(crate) struct NmtReport {
     state: Option<String>,
     /// What each node has reported, where all were commanded and waited for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    nodes: Option<Vec<Said>>,
+    nodes: Option<Vec<NmtAnswer>>,
 }
 
 /// What a node has said.
 #[derive(Debug, Serialize)]
-struct Said {
+struct NmtAnswer {
     node: u8,
     state: String,
     /// Its boot-up message has come.
@@ -175,7 +175,7 @@ impl Nmt {
 }
 
 /// What every node says within a time.
-async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
+async fn said_by_all(context: &Context, patience: Duration) -> Vec<NmtAnswer> {
     let before = context.network.now();
     context.progress.show("listening to the nodes");
     context.network.sleep(patience).await;
@@ -185,7 +185,7 @@ async fn said_by_all(context: &Context, patience: Duration) -> Vec<Said> {
         // The state of an alarm heartbeat is its model's to read.
         let state = facts.probable_state(context.stated_model(node))?;
         let booted = facts.boot_up.is_some_and(|(at, _)| at >= before);
-        Some(Said { node: node.raw(), state: state.to_string(), booted })
+        Some(NmtAnswer { node: node.raw(), state: state.to_string(), booted })
     });
     said.collect()
 }
@@ -208,7 +208,7 @@ impl Report for NmtReport {
         let booted = if self.booted == Some(true) { "; it has booted" } else { "" };
         let state = self.state.as_ref().map(|state| format!("; it is {state}")).unwrap_or_default();
         let mut text = format!("{whom}: {} sent{booted}{state}", self.command);
-        for Said { node, state, booted } in self.nodes.iter().flatten() {
+        for NmtAnswer { node, state, booted } in self.nodes.iter().flatten() {
             let booted = if *booted { "has booted, " } else { "" };
             text.push_str(&format!("\n  node {node}: {booted}{state}"));
         }

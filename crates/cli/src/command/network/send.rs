@@ -3,7 +3,7 @@
 use can::Frame;
 use serde::Serialize;
 
-use crate::command::repeat::{Pace, Repeat};
+use crate::command::repeat::{Repeat, Ticker};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -44,7 +44,7 @@ impl Send {
     /// Sends them, and leaves the bus a moment to answer.
     pub(crate) async fn run(&self, context: &Context) -> Result<SendReport, Failure> {
         let times = self.repeat.times(context)?;
-        let mut pace = Pace::new(&context.network, self.repeat.every.unwrap_or_default());
+        let mut pace = Ticker::new(&context.network, self.repeat.every.unwrap_or_default());
         let mut done = 0;
         while times.is_none_or(|times| done < times) {
             pace.wait().await;

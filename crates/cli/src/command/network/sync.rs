@@ -5,7 +5,7 @@ use canopen::connection_set;
 use canopen::sync::Sync;
 use serde::Serialize;
 
-use crate::command::repeat::{Pace, Repeat};
+use crate::command::repeat::{Repeat, Ticker};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -48,7 +48,7 @@ impl SyncCommand {
     pub(crate) async fn run(&self, context: &Context) -> Result<SyncReport, Failure> {
         let times = self.repeat.times(context)?;
         let id = self.id.unwrap_or(connection_set::SYNC);
-        let mut pace = Pace::new(&context.network, self.repeat.every.unwrap_or_default());
+        let mut pace = Ticker::new(&context.network, self.repeat.every.unwrap_or_default());
         let mut sent = 0;
         while times.is_none_or(|times| sent < times) {
             pace.wait().await;

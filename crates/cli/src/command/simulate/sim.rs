@@ -30,7 +30,9 @@ use crate::global::Global;
 use crate::output::{file_path, ready_line};
 use crate::plain::plain;
 use crate::recording::{LogPath, RecordOptions};
-use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
+use crate::served::{
+    ClockArg, ControlOptions, ServiceRequest, at_the_end, is_typed, listen_to_signals, runtime_of_clients,
+};
 use crate::session::{bus_failure, enter_real_time, not_served, start_clock};
 use console::numbers::whole;
 use described::notes;
@@ -307,12 +309,14 @@ impl Sim {
         if let Some(eeproms) = eeproms {
             let stored = requests.clone();
             // A full queue wakes the loop as well.
-            world.keep_stores(StoreWriter::start(eeproms, warnings, move || drop(stored.try_send(Asked::Stored))));
+            world.keep_stores(StoreWriter::start(eeproms, warnings, move || {
+                drop(stored.try_send(ServiceRequest::Stored))
+            }));
         }
         let over = requests.clone();
-        world.on_run_over(move || over.try_send(Asked::RunIsOver).is_ok());
+        world.on_run_over(move || over.try_send(ServiceRequest::RunIsOver).is_ok());
         let full = requests.clone();
-        world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
+        world.on_full_piece(move || full.try_send(ServiceRequest::PieceIsFull).is_ok());
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         let places = hub.listeners().iter().map(ToString::to_string);
         let places = places.chain(modbus.iter().map(|server| server.place().to_string()));
@@ -340,7 +344,7 @@ impl Sim {
     /// The server of `--modbus`, listening.
     async fn serve_registers(
         &self,
-        requests: &mpsc::Sender<Asked>,
+        requests: &mpsc::Sender<ServiceRequest>,
         clock: &WallClock,
     ) -> Result<Option<ModbusServer>, Failure> {
         let Some(place) = &self.modbus else { return Ok(None) };
@@ -412,13 +416,13 @@ pub(crate) fn note_what_the_image_changes(
 
 /// Joins another bus to this one. A bus that goes away and comes back is waited for, and the drives go on meanwhile; its end
 /// ends the simulator.
-fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<Asked>, global: Global, warnings: Messages) {
+fn join(hub: &Hub, outer: AnyBus, requests: mpsc::Sender<ServiceRequest>, global: Global, warnings: Messages) {
     let mut notes = BusNotes::of(&global.bus);
     let joined = hub.join(outer, move |note| {
         notes.news(note).iter().for_each(|text| warnings.say(&plain(&format!("note: {text}"))));
     });
     tokio::spawn(async move {
         let error = joined.await;
-        let _ = requests.send(Asked::Ended(bus_failure(&global, &error))).await;
+        let _ = requests.send(ServiceRequest::Ended(bus_failure(&global, &error))).await;
     });
 }

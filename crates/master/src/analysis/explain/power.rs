@@ -104,14 +104,14 @@ fn missing_bits(controlword: Controlword) -> String {
 }
 
 /// The controlword that others send by a valid RPDO, and in which frames.
-struct Sent<'a> {
+struct ControlwordRpdo<'a> {
     controlword: Controlword,
     config: &'a PdoConfig,
     id: u16,
     count: u64,
 }
 
-fn sent_by_rpdo(seen: &Observed) -> Option<Sent<'_>> {
+fn sent_by_rpdo(seen: &Observed) -> Option<ControlwordRpdo<'_>> {
     let object = seen.place(CONTROLWORD);
     let mut rpdos =
         seen.pdos.iter().filter(|(config, cob_id)| config.pdo.direction == Direction::Rpdo && cob_id.is_valid());
@@ -119,14 +119,19 @@ fn sent_by_rpdo(seen: &Observed) -> Option<Sent<'_>> {
         let bits = config.map.find(object)?;
         let id = cob_id.can_id().as_standard()?;
         let heard = seen.heard.under(id)?;
-        Some(Sent { controlword: Controlword((heard.bits >> bits.start) as u16), config, id, count: heard.count })
+        Some(ControlwordRpdo {
+            controlword: Controlword((heard.bits >> bits.start) as u16),
+            config,
+            id,
+            count: heard.count,
+        })
     })
 }
 
 /// What is written by SDO lasts until the next frame of an RPDO with the controlword. Frames of which the drive has nothing in 6040h
 /// are not a cause.
-fn by_rpdo(seen: &Observed, sent: &Sent<'_>, state: PowerState) -> Option<Finding> {
-    let Sent { controlword, config, id, count } = *sent;
+fn by_rpdo(seen: &Observed, sent: &ControlwordRpdo<'_>, state: PowerState) -> Option<Finding> {
+    let ControlwordRpdo { controlword, config, id, count } = *sent;
     let acts = seen.controlword().is_none_or(|has| has == controlword);
     (acts && controlword.command() != PowerCommand::EnableOperation).then(|| {
         cause(
@@ -152,13 +157,13 @@ fn by_rpdo(seen: &Observed, sent: &Sent<'_>, state: PowerState) -> Option<Findin
 
 /// CiA 301, 7.3.2.2.2: a node takes no PDO before it is operational. Where its state is heard, the PDOs are explained by it; a node
 /// that sends no heartbeat and no PDO does not show it.
-fn rpdo_not_taken(seen: &Observed, sent: &Sent<'_>) -> Option<Finding> {
+fn rpdo_not_taken(seen: &Observed, sent: &ControlwordRpdo<'_>) -> Option<Finding> {
     let has = seen.controlword()?;
     let is_operational = seen.pdos.iter().any(|(config, cob_id)| {
         let id = cob_id.can_id().as_standard();
         config.pdo.direction == Direction::Tpdo && id.is_some_and(|id| seen.heard.under(id).is_some())
     });
-    let Sent { controlword, config, id, count } = *sent;
+    let ControlwordRpdo { controlword, config, id, count } = *sent;
     (seen.nmt.is_none() && !is_operational && has != controlword).then(|| {
         cause(
             TOPIC,

@@ -44,7 +44,7 @@ const ERROR_BITS: u64 = 31;
 const ROUNDS: usize = 200;
 
 /// A frame in nanoseconds.
-struct Sent<'a> {
+struct PeriodicFrame<'a> {
     key: u32,
     time_ns: u64,
     period_ns: u64,
@@ -68,7 +68,7 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
     let bus = LoadedBus {
         bit_ns,
         error_ns: errors.map(|ErrorRate(every)| nanos(every).max(1)),
-        frames: frames.iter().map(|frame| Sent::new(frame, bit_ns)).collect(),
+        frames: frames.iter().map(|frame| PeriodicFrame::new(frame, bit_ns)).collect(),
     };
     let mut known = vec![Known { response_ns: Some(0), ..Known::default() }; frames.len()];
     let mut is_settled = false;
@@ -99,7 +99,8 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
         worst.map(|response_ns| begins_ns + response_ns)
     });
     let mut settled: Vec<Option<u64>> = settled.collect();
-    let is_late = |(worst, sent): (&Option<u64>, &Sent<'_>)| worst.is_none_or(|worst_ns| worst_ns > sent.period_ns);
+    let is_late =
+        |(worst, sent): (&Option<u64>, &PeriodicFrame<'_>)| worst.is_none_or(|worst_ns| worst_ns > sent.period_ns);
     if settled.iter().zip(&bus.frames).any(is_late) && load(frames, bitrate) <= 1.0 {
         let in_step = InStep::new(frames, bit_ns, bus.error_ns, ERROR_BITS).longest();
         for (worst, in_step) in settled.iter_mut().zip(in_step) {
@@ -114,7 +115,11 @@ pub fn response_times(frames: &[Queued], bitrate: Bitrate, errors: Option<ErrorR
 /// Share of its time that the bus is taken, with the most stuff bits: 1 is all of it.
 pub fn load(frames: &[Queued], bitrate: Bitrate) -> f64 {
     let bit_ns = bitrate.bit_nanos();
-    frames.iter().map(|frame| Sent::new(frame, bit_ns)).map(|sent| sent.time_ns as f64 / sent.period_ns as f64).sum()
+    frames
+        .iter()
+        .map(|frame| PeriodicFrame::new(frame, bit_ns))
+        .map(|sent| sent.time_ns as f64 / sent.period_ns as f64)
+        .sum()
 }
 
 /// The jitter with which a frame is offered: its own, and that of its trigger's coming.
@@ -126,7 +131,7 @@ fn offered_late(frame: &Queued, frames: &[Queued], known: &[Known], bit_ns: u64)
     own_ns + latest_ns.saturating_sub(after(&trigger, frames, bit_ns))
 }
 
-impl<'a> Sent<'a> {
+impl<'a> PeriodicFrame<'a> {
     fn new(frame: &'a Queued, bit_ns: u64) -> Self {
         Self {
             key: Frame::new(frame.id, &[]).arbitration_key(),
@@ -140,7 +145,7 @@ impl<'a> Sent<'a> {
 struct LoadedBus<'a> {
     bit_ns: u64,
     error_ns: Option<u64>,
-    frames: Vec<Sent<'a>>,
+    frames: Vec<PeriodicFrame<'a>>,
 }
 
 impl LoadedBus<'_> {
@@ -165,7 +170,7 @@ impl LoadedBus<'_> {
             return None;
         }
         let blocking_ns = others().filter(|(_, frame)| frame.key > level).map(|(_, frame)| frame.time_ns).max();
-        let work = Work {
+        let work = UrgentLoad {
             bit_ns: self.bit_ns,
             urgent: &urgent,
             error: self.error_ns.map(|every_ns| {
@@ -191,7 +196,7 @@ impl LoadedBus<'_> {
 }
 
 /// What more urgent frames and errors take of a time.
-struct Work<'a> {
+struct UrgentLoad<'a> {
     bit_ns: u64,
     /// Time on the wire, period, jitter.
     urgent: &'a [(u64, u64, u64)],
@@ -199,7 +204,7 @@ struct Work<'a> {
     error: Option<(u64, u64)>,
 }
 
-impl Work<'_> {
+impl UrgentLoad<'_> {
     fn taken_ns(&self, within_ns: u64) -> u64 {
         let urgent = self.urgent.iter().map(|(time_ns, period_ns, late_ns)| {
             (within_ns + late_ns + self.bit_ns).div_ceil(*period_ns).saturating_mul(*time_ns)
@@ -228,7 +233,7 @@ impl Work<'_> {
     }
 
     /// The longest wait of any instance in the busy period, each counted from its own being offered, its jitter left out.
-    fn longest_wait(&self, own: &Sent<'_>, late_ns: u64, blocking_ns: u64) -> Option<u64> {
+    fn longest_wait(&self, own: &PeriodicFrame<'_>, late_ns: u64, blocking_ns: u64) -> Option<u64> {
         let busy_ns = self.busy(own, late_ns, blocking_ns)?;
         let mut longest_ns = 0;
         let mut from_ns = 0;
@@ -242,7 +247,7 @@ impl Work<'_> {
     }
 
     /// How long the bus may go on with frames that are no less urgent than this one.
-    fn busy(&self, own: &Sent<'_>, late_ns: u64, blocking_ns: u64) -> Option<u64> {
+    fn busy(&self, own: &PeriodicFrame<'_>, late_ns: u64, blocking_ns: u64) -> Option<u64> {
         let mut busy_ns = own.time_ns;
         loop {
             let own_ns = (busy_ns + late_ns).div_ceil(own.period_ns).saturating_mul(own.time_ns);

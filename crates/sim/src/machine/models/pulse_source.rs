@@ -15,14 +15,14 @@ const CHANGES: Quantity = Quantity { what: "changes of level", expected: "0 to 2
 /// A pulse generator wired to PU and DIR.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PulseSource {
-    train: Option<Running>,
+    train: Option<PulseTrainState>,
     input: PulseInput,
     /// Level of DIR while it is a clock.
     dir: Option<bool>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Running {
+struct PulseTrainState {
     train: PulseTrain,
     /// Pulses or counts sent, with the share of the one under way.
     sent: f64,
@@ -47,7 +47,7 @@ impl PulseSource {
         }
         self.input.duty = None;
         self.dir = matches!(train, PulseTrain::Clock(_)).then_some(false);
-        self.train = Some(Running { train, sent: 0.0 });
+        self.train = Some(PulseTrainState { train, sent: 0.0 });
         Ok(())
     }
 

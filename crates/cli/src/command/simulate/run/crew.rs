@@ -60,7 +60,7 @@ impl Crew {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = self.jobs.unwrap_or(cores).min(usize::try_from(count).unwrap_or(usize::MAX));
         let next = AtomicU64::new(0);
-        let taken = Taken::default();
+        let taken = TakenCount::default();
         let clock = WallClock::start();
         let (results, incoming) = mpsc::channel();
         std::thread::scope(|scope| {
@@ -134,14 +134,14 @@ impl<T> Batch<T> {
 /// How many results have been taken. Threads that are not far ahead look at it without a lock, which would have them wait for the one
 /// thread that takes results.
 #[derive(Default)]
-struct Taken {
+struct TakenCount {
     count: AtomicU64,
     waiting: AtomicU64,
     lock: Mutex<()>,
     more: Condvar,
 }
 
-impl Taken {
+impl TakenCount {
     /// Whether so many have been taken.
     fn has(&self, wanted: u64) -> bool {
         self.count.load(Ordering::SeqCst) >= wanted
@@ -170,8 +170,8 @@ impl Taken {
     }
 }
 
-/// See [`Taken::on_panic`].
-struct OnPanic<'a>(&'a Taken, &'a AtomicBool);
+/// See [`TakenCount::on_panic`].
+struct OnPanic<'a>(&'a TakenCount, &'a AtomicBool);
 
 impl Drop for OnPanic<'_> {
     fn drop(&mut self) {

@@ -147,7 +147,7 @@ impl Run {
             Failure::usage("cannot sweep").because(reason).next("give --seeds 1..1000, and fewer values to [sweep]")
         })?;
         let sweep = sweep.of_shard(self.shard.unwrap_or(Shard::WHOLE));
-        let asked = sweeping::Asked {
+        let asked = sweeping::SweepOptions {
             jobs: self.jobs,
             output: self.output.as_deref(),
             resume: self.resume,

@@ -16,7 +16,9 @@ use super::loaded::unbuildable;
 use crate::failure::Failure;
 use crate::output::ready_line;
 use crate::recording::RecordOptions;
-use crate::served::{Asked, ClockArg, ControlOptions, at_the_end, is_typed, listen_to_signals, runtime_of_clients};
+use crate::served::{
+    ClockArg, ControlOptions, ServiceRequest, at_the_end, is_typed, listen_to_signals, runtime_of_clients,
+};
 use crate::session::not_served;
 
 /// Where and how fast a scenario is served.
@@ -96,9 +98,9 @@ impl ServeOptions {
         let mut hub = Hub::bind(&self.places, options, &clock).await.map_err(|error| not_served(&error))?;
         let control = self.control.serve(&mut world, &requests, &service.warnings).await?;
         let (run_is_over, scenario_is_over, full) = (requests.clone(), requests.clone(), requests.clone());
-        world.on_run_over(move || run_is_over.try_send(Asked::RunIsOver).is_ok());
-        world.on_full_piece(move || full.try_send(Asked::PieceIsFull).is_ok());
-        world.follow(execution, move || scenario_is_over.try_send(Asked::ScenarioIsOver).is_ok());
+        world.on_run_over(move || run_is_over.try_send(ServiceRequest::RunIsOver).is_ok());
+        world.on_full_piece(move || full.try_send(ServiceRequest::PieceIsFull).is_ok());
+        world.follow(execution, move || scenario_is_over.try_send(ServiceRequest::ScenarioIsOver).is_ok());
         let places = hub.listeners().iter().map(ToString::to_string);
         let places: Vec<_> = places.chain(control.iter().map(|server| server.place().to_string())).collect();
         service.answers.say(&ready_line(json, &places));

@@ -23,7 +23,7 @@ const MOST_VALUES: usize = 40;
 const RUNS_A_LOOK: u64 = 16;
 
 /// What is asked of a sweep.
-pub(super) struct Asked<'a> {
+pub(super) struct SweepOptions<'a> {
     /// Runs at once; `None` for as many as there are cores.
     pub(super) jobs: Option<u16>,
     /// Where the results go.
@@ -37,7 +37,7 @@ pub(super) struct Asked<'a> {
 }
 
 /// Makes the runs, or puts their results together, and prints what came of them.
-pub(super) fn sweep(sweep: &Sweep, asked: &Asked<'_>, file: &Path, format: Format) -> Result<(), Failure> {
+pub(super) fn sweep(sweep: &Sweep, asked: &SweepOptions<'_>, file: &Path, format: Format) -> Result<(), Failure> {
     let mut summary = Summary::default();
     if !asked.merge.is_empty() {
         merge_files(asked.merge, asked.output, sweep, &mut summary, &asked.again)?;
@@ -97,7 +97,7 @@ fn make_runs(
 fn print(
     sweep: &Sweep,
     summary: &Summary,
-    asked: &Asked<'_>,
+    asked: &SweepOptions<'_>,
     file: &Path,
     format: Format,
     ended: Option<Failure>,
