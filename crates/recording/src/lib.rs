@@ -33,6 +33,6 @@ pub use column::{Column, Subject, columns_of_drives, ending_of, is_called, selec
 pub use convert::mcap_of_csv;
 pub use picture::{overlay, picture};
 pub use piece::{Batch, Entry, Kind, Mark, Recorded, Series, Severity, Target};
-pub use read::read;
+pub use read::{read, read_csv};
 pub use record::Record;
 pub use trail::Trail;

@@ -16,13 +16,17 @@ use super::piece::{Kind, Mark, Recorded, Series, Severity};
 pub fn read(kind: Kind, bytes: &[u8]) -> Result<Recorded, String> {
     let mut recorded = match kind {
         Kind::Mcap => read_mcap(bytes)?,
-        Kind::Csv => read_csv(bytes)?,
+        Kind::Csv => return read_csv(bytes),
     };
     recorded.series.retain(|series| !series.points.is_empty());
     Ok(recorded)
 }
 
-fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
+/// The contents of a CSV file.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
     let mut lines = CsvLines::of(bytes)?;
     let series = lines.columns.iter().map(|column| Series { column: column.clone(), points: Vec::new() });
     let mut recorded = Recorded { torn: lines.torn, series: series.collect(), marks: Vec::new() };
@@ -33,6 +37,7 @@ fn read_csv(bytes: &[u8]) -> Result<Recorded, String> {
         }
         recorded.marks.extend(note(at, text));
     }
+    recorded.series.retain(|series| !series.points.is_empty());
     Ok(recorded)
 }
 

@@ -6,7 +6,7 @@ use crate::test_motion::Order;
 
 /// What is done with what can be measured of a node, and with what is known of it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum CaptureCommand {
     /// Lists what can be captured of a node.
     CaptureQuantities {},

@@ -13,6 +13,13 @@ pub(crate) fn whole<T: DeserializeOwned>(fields: Fields) -> Result<T, String> {
     from_value(Value::Object(fields)).map_err(|error| error.to_string())
 }
 
+/// A command by its word and its fields, which refuses those that it does not have. Serde reads the word first then: where it has to
+/// look for the word among the fields, it keeps all of them in a form of its own, which is much code for each type.
+pub(crate) fn command<T: DeserializeOwned>(word: &str, mut fields: Fields) -> Result<T, String> {
+    fields.remove("do");
+    whole(Fields::from_iter([(word.to_owned(), Value::Object(fields))]))
+}
+
 /// A field, taken out; one that is omitted is `null`.
 pub(super) fn taken<T: DeserializeOwned>(fields: &mut Fields, name: &str) -> Result<T, String> {
     match fields.remove(name) {

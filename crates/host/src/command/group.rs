@@ -8,7 +8,7 @@ use super::fields;
 
 /// A motion of several drives.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GroupCommand {
     /// Turns several drives to positions, or by angles, together.
     GroupMove(GroupMove),

@@ -26,7 +26,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
-use fields::{Fields, whole};
+use fields::{Fields, command};
 
 /// A command of a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,13 +95,13 @@ fn read(mut fields: Fields) -> Result<Command, String> {
     };
     let of = |words: &[&str]| words.contains(&word.as_str());
     if of(SessionCommand::WORDS) {
-        return whole(fields).map(Command::Session);
+        return command(&word, fields).map(Command::Session);
     }
     if of(WorldCommand::WORDS) {
-        return whole(fields).map(Command::World);
+        return command(&word, fields).map(Command::World);
     }
     if of(GroupCommand::WORDS) {
-        return whole(fields).map(Command::Group);
+        return command(&word, fields).map(Command::Group);
     }
     if !NodeCommand::words().any(|known| known == word) {
         let known = [SessionCommand::WORDS, WorldCommand::WORDS, GroupCommand::WORDS].into_iter().flatten().copied();
@@ -120,7 +120,7 @@ mod tests {
 
     /// The variants that serde names when it meets one that it does not know.
     fn variants<T: DeserializeOwned>() -> Vec<String> {
-        let refused = serde_json::from_str::<T>(r#"{"do":"none"}"#).err().map(|error| error.to_string());
+        let refused = serde_json::from_str::<T>(r#"{"none":{}}"#).err().map(|error| error.to_string());
         let refused = refused.unwrap_or_default();
         refused.split('`').skip(3).step_by(2).map(str::to_owned).collect()
     }

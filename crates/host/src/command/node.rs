@@ -1,7 +1,7 @@
 //! Commands to one node, as JSON.
 
 use super::capture::CaptureCommand;
-use super::fields::{Fields, taken, whole};
+use super::fields::{Fields, command, taken};
 use super::parameters::{ParameterChange, ParameterReading};
 use super::pdo::PdoCommand;
 use super::tune::TuneCommand;
@@ -96,19 +96,19 @@ impl From<drive::Command> for NodeCommand {
 /// A command of one of the [words](NodeCommand::words).
 pub(super) fn read(word: &str, mut fields: Fields) -> Result<NodeCommand, String> {
     if ParameterReading::WORDS.contains(&word) {
-        return whole(fields).map(NodeCommand::Read);
+        return command(word, fields).map(NodeCommand::Read);
     }
     if ParameterChange::WORDS.contains(&word) {
-        return whole(fields).map(NodeCommand::Change);
+        return command(word, fields).map(NodeCommand::Change);
     }
     if PdoCommand::WORDS.contains(&word) {
-        return whole(fields).map(NodeCommand::Pdos);
+        return command(word, fields).map(NodeCommand::Pdos);
     }
     if CaptureCommand::WORDS.contains(&word) {
-        return whole(fields).map(NodeCommand::Capture);
+        return command(word, fields).map(NodeCommand::Capture);
     }
     if TuneCommand::WORDS.contains(&word) {
-        return whole(fields).map(NodeCommand::Tune);
+        return command(word, fields).map(NodeCommand::Tune);
     }
     fields.remove("do");
     let command = match word {

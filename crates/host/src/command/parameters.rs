@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 /// What is read of the parameters of a drive, or planned for them.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ParameterReading {
     /// Reads the present values of objects.
     ReadObjects {
@@ -38,7 +38,7 @@ impl ParameterReading {
 
 /// A change of the parameters of a drive.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ParameterChange {
     /// Writes values or a file, all or nothing.
     WriteParameters {

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 /// What is done with the PDOs of a node.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PdoCommand {
     /// Reads the configuration of the PDOs of a node, what may be changed, and why one is not sent.
     Pdos {},

@@ -7,7 +7,7 @@ use super::fields;
 
 /// What concerns the session, or the bus as a whole.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum SessionCommand {
     /// Shows that the session is there; required at least every [`crate::PRESENCE_SPAN`] from one that moves something.
     Alive {},
@@ -78,7 +78,7 @@ impl SessionCommand {
 
 /// What concerns the world around virtual drives.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum WorldCommand {
     /// Lists the commands to the world around virtual drives.
     WorldForms {},

@@ -6,7 +6,7 @@ use crate::tune::{LoadOrder, Order};
 
 /// What is done about the gains of a drive, or the ramps of a stepper.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum TuneCommand {
     /// What can be found for a node: gains, or ramps; and what is usual for that.
     TuneForm {},

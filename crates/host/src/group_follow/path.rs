@@ -5,7 +5,7 @@ use std::path::Path;
 
 use canopen::NodeId;
 use master::Drive;
-use recording::{Column, Kind, Recorded, Subject, is_called};
+use recording::{Column, Kind, Recorded, Subject, is_called, read_csv};
 use words::document::read_bytes;
 use words::failure::Failure;
 
@@ -87,7 +87,7 @@ impl RecordedPath {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Self, Failure> {
-        let recorded = recording::read(Kind::Csv, bytes).map_err(|why| bad(name, why).next(FORM))?;
+        let recorded = read_csv(bytes).map_err(|why| bad(name, why).next(FORM))?;
         if recorded.torn {
             return Err(bad(name, "its last line has no end: it may be cut off")
                 .next("end it with a line break if it is complete, or take the line out"));
