@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::process::{self, quietly};
 use crate::say::say;
 use crate::sysroot::{Rust, Target};
-use crate::{debian, workspace};
+use crate::{builder, debian, workspace};
 
 /// An architecture for which a release can be made here.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +76,7 @@ impl Cross {
         command.env(format!("CARGO_TARGET_{}_LINKER", in_variable.to_uppercase()), &gcc);
         command.env(format!("CC_{in_variable}"), &gcc).env(format!("AR_{in_variable}"), format!("{prefix}-ar"));
         self.rust.set_sysroot(command);
+        builder::leave_out(command);
     }
 
     /// The target, as `--target` takes it.

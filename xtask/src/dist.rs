@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 use crate::cross::Cross;
 use crate::say::say;
 use crate::tally::Tally;
-use crate::{pgo, process, program, python, wheel, workspace};
+use crate::{builder, pgo, process, program, python, wheel, workspace};
 
 const SHELLS: &[(&str, &str)] = &[("bash", "ferrodrive.bash"), ("zsh", "_ferrodrive"), ("fish", "ferrodrive.fish")];
 
@@ -131,6 +131,11 @@ fn make(binaries: &Binaries<'_>, profile: &str, release: &Path) -> Result<Vec<St
     let name = binary.to_string_lossy();
     if !cross.map_or_else(|| process::works("strip", &[&name]), |cross| cross.strip(&name)) {
         notes.push("the binary is not stripped: there is no `strip` here".to_owned());
+    }
+    if profile != "dev"
+        && let Some(path) = builder::named_in(&binary)?
+    {
+        return Err(format!("{} names a folder of this machine: {path}", binary.display()));
     }
     let run = |words: &[&str]| process::output(Command::new(speaker).args(words));
     run(&["man-pages", &folder.join("man/man1").to_string_lossy()])?;

@@ -8,6 +8,9 @@ mod bare_metal;
 mod bench;
 mod bench_peers;
 mod browser;
+mod builder;
+#[path = "../../crates/studio/src/web/bundle.rs"]
+mod bundle;
 mod conform_peers;
 mod cross;
 mod debian;
@@ -26,6 +29,7 @@ mod program;
 mod python;
 mod say;
 mod since;
+mod site;
 mod steps;
 mod sysroot;
 mod table;

@@ -13,7 +13,7 @@ use crate::workspace;
 const PROGRAMS: &[(&str, &str)] = &[("node", "nodejs")];
 
 /// What checks the types of the page, which `jsconfig.json` switches on.
-const TYPESCRIPT: (&str, &str) = ("typescript", "5.9.3");
+pub(crate) const TYPESCRIPT: (&str, &str, &str) = ("typescript", "5.9.3", "bin/tsc");
 
 pub(crate) fn step() -> Tally {
     if let Err(reason) = debian::install(PROGRAMS) {
@@ -46,7 +46,7 @@ pub(crate) fn tests(node: &mut Command, folder: &str) -> Tally {
 
 /// The same and the types.
 fn with_types(tally: Tally) -> Tally {
-    let compiler = match npm::install(TYPESCRIPT.0, TYPESCRIPT.1, "bin/tsc") {
+    let compiler = match npm::install(TYPESCRIPT.0, TYPESCRIPT.1, TYPESCRIPT.2) {
         Ok(compiler) => compiler,
         Err(reason) if tally.failed == 0 => return Tally { skipped: tally.skipped + 1, note: reason, ..tally },
         Err(_) => return tally,

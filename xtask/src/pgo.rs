@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use crate::{process, python, workspace};
+use crate::{builder, process, python, workspace};
 
 /// Virtual milliseconds of each training world, by how many drives its name begins with: about a second of real time.
 const TRAINING_MS: u32 = 3000;
@@ -150,11 +150,11 @@ struct Build {
 impl Build {
     /// Only the target's code gets the flag, not what runs while it is built.
     fn new(rustc: &Rustc, target: PathBuf, flag: &str) -> Result<Self, String> {
-        let flags = std::env::var("RUSTFLAGS").unwrap_or_default();
         let mut cargo = workspace::cargo();
         cargo.args(["build", "--profile", "dist", "--quiet", "--target", &rustc.host, "--target-dir"]).arg(&target);
         cargo.args(["-p", "ferrodrive", "-p", "ferrodrive-benches", "--bin", "ferrodrive", "--example", "run_world"]);
-        cargo.env("RUSTFLAGS", format!("{flags} {flag}"));
+        builder::leave_out(&mut cargo);
+        builder::add_flags(&mut cargo, &[flag.to_owned()]);
         if !process::run(&mut cargo, |line| println!("{line}"))? {
             return Err(format!("it does not build with {flag}"));
         }

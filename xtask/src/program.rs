@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::say::say;
 use crate::tally::Tally;
-use crate::{process, workspace};
+use crate::{builder, process, workspace};
 
 /// The binary of the tests, which is built if need be; or what to report when it does not build or does not know `command`.
 pub(crate) fn build(command: &str) -> Result<PathBuf, Tally> {
@@ -25,7 +25,9 @@ pub(crate) fn built() -> Result<PathBuf, String> {
 pub(crate) fn of_dist() -> Result<PathBuf, String> {
     say("building the binary (dist)");
     let words = ["build", "--quiet", "--profile", "dist", "--package", "ferrodrive", "--bin", "ferrodrive"];
-    process::output(workspace::cargo().args(words))?;
+    let mut cargo = workspace::cargo();
+    builder::leave_out(&mut cargo);
+    process::output(cargo.args(words))?;
     Ok(workspace::target().join("dist").join(format!("ferrodrive{}", std::env::consts::EXE_SUFFIX)))
 }
 

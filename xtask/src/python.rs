@@ -11,7 +11,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use crate::cross::Cross;
 use crate::say::say;
 use crate::tally::Tally;
-use crate::{process, program, workspace};
+use crate::{builder, process, program, workspace};
 
 /// The pinned packages that the wheel is built and tested with.
 pub(crate) const REQUIREMENTS: &str = "crates/python/tests/requirements.txt";
@@ -96,6 +96,9 @@ pub(crate) fn wheel(
             pip.arg(format!("--config-settings=build-args=--profile dev --locked --features {SHARED_BUILD}"));
         }
         None => {}
+    }
+    if profile != "dev" {
+        builder::leave_out(&mut pip);
     }
     pip.env("FERRODRIVE_PROFILE", profile).env("CARGO_TARGET_DIR", workspace::target());
     pip.envs(program.map(|program| ("FERRODRIVE_PROGRAM", program)));

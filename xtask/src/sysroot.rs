@@ -6,6 +6,7 @@ use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
 use crate::debian::{apt, last_line};
+use crate::builder;
 use crate::process::{self, output, quietly};
 use crate::say::say;
 use crate::workspace;
@@ -60,6 +61,11 @@ impl Rust {
             let _ = std::fs::remove_dir_all(&built);
         }
         Ok(Self { target, sysroot: Some(made.sysroot), programs, built })
+    }
+
+    /// Its standard library was made here, with the target's features; else it is the toolchain's own.
+    pub(crate) const fn is_made(&self) -> bool {
+        self.sysroot.is_some()
     }
 
     /// Cargo with this sysroot.
@@ -138,7 +144,9 @@ impl Made {
         // Of this version alone, and from where they were unpacked: Cargo has no stable option for either.
         cargo.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", library);
         // With bitcode, as the libraries of a toolchain have it: a program may be optimised as a whole (LTO).
-        quietly(cargo.env("CARGO_ENCODED_RUSTFLAGS", "-Cembed-bitcode=yes"))?;
+        cargo.env("CARGO_ENCODED_RUSTFLAGS", "-Cembed-bitcode=yes");
+        builder::leave_out(&mut cargo);
+        quietly(&mut cargo)?;
         let built = folder.join("target").join(self.target.name).join("release/deps");
         let files = std::fs::read_dir(built).map_err(failed)?.filter_map(|entry| Some(entry.ok()?.path()));
         let is_library = |path: &PathBuf| {

@@ -6,15 +6,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use serde_json::json;
-use sha2::{Digest, Sha256};
-
-use crate::dist::{copy, write};
 use crate::process::{self, quietly};
 use crate::say::say;
+use crate::site::{self, Sizes};
 use crate::sysroot::{Rust, Target};
 use crate::tally::Tally;
-use crate::{debian, page, program, wasm_order, workspace};
+use crate::{builder, debian, npm, page, program, workspace};
 
 /// A page, and node.
 const TARGET: Target = Target {
@@ -25,9 +22,11 @@ const TARGET: Target = Target {
     panic: "abort",
 };
 
-/// Nothing is fetched from anywhere but the page's own host, and nothing in the page is a script but its files.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
-     worker-src 'self'; form-action 'none'; base-uri 'none'";
+/// A module that takes more is ended, which the page reports: the browser would end the tab without a word. The drives of a page take some ten MB.
+const MOST_MEMORY: u32 = 1 << 30;
+
+/// Most that a host may have to send for the page, in bytes by `gzip -9`: what it is, and some kB. The aim is 1.5 MB.
+const MOST_SENT: u64 = 1_700_000;
 
 /// What runs the module, with the packages of Debian that they are in.
 const PROGRAMS: &[(&str, &str)] = &[("node", "nodejs"), ("chromium", "chromium"), ("chromedriver", "chromium-driver")];
@@ -51,9 +50,13 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
         );
         return ExitCode::from(2);
     }
-    let module = Rust::found(TARGET, &self::folder()).and_then(|rust| module(&rust, "web"));
-    match module.and_then(|module| make(&module, &folder)) {
-        Ok(()) => {
+    match Rust::found(TARGET, &self::folder()).and_then(|rust| make(&rust, &folder)) {
+        Ok(notes) => {
+            notes.iter().for_each(|note| println!("{note}"));
+            match site::sizes(&folder) {
+                Ok(sizes) => println!("{}", said(&sizes)),
+                Err(error) => println!("its size when compressed is not known: {error}"),
+            }
             println!("{}", folder.display());
             ExitCode::SUCCESS
         }
@@ -74,20 +77,72 @@ pub(crate) fn step() -> Tally {
         Ok(rust) => rust,
         Err(reason) => return Tally::skipped(reason),
     };
-    let module = match module(&rust, "web") {
-        Ok(module) => module,
+    let (folder, pictures) = (folder().join("tested"), folder().join("pictures"));
+    let notes = match make(&rust, &folder) {
+        Ok(notes) => notes,
         Err(error) => return Tally::failed(error),
     };
-    let (folder, pictures) = (folder().join("tested"), folder().join("pictures"));
-    let made = make(&module, &folder).and_then(|()| fs::create_dir_all(&pictures).map_err(|error| error.to_string()));
-    let program = match made.and_then(|()| program::built()) {
+    let mut tally = judge(&folder, &notes, rust.is_made());
+    let program = match fs::create_dir_all(&pictures).map_err(|error| error.to_string()).and_then(|()| program::built())
+    {
         Ok(program) => program,
         Err(error) => return Tally::failed(error),
     };
+    // Another engine, for one test, which is skipped without it.
+    let _ = debian::install(&[("firefox-esr", "firefox-esr")]);
     let mut node = Command::new("node");
     node.current_dir(workspace::root().join("crates/web"));
     node.env("SITE", folder).env("FERRODRIVE", program).env("PICTURES", pictures);
-    page::tests(node.env("SCENARIOS", workspace::root().join("examples/scenarios")), "site_tests/")
+    node.env("SCENARIOS", workspace::root().join("examples/scenarios"));
+    tally.add(&page::tests(&mut node, "site_tests/"));
+    tally.add(&types());
+    tally
+}
+
+/// Whether the page is what it should be before it runs: small, and without the folders of this machine.
+fn judge(folder: &Path, notes: &[String], is_small: bool) -> Tally {
+    let mut tally = notes.iter().fold(Tally::default(), |mut tally, note| {
+        tally.add(&Tally::failed(note.clone()));
+        tally
+    });
+    match site::sizes(folder) {
+        Ok(sizes) => {
+            say(said(&sizes));
+            let what = format!("{} bytes by gzip -9, and at most {MOST_SENT} are meant", sizes.gzip);
+            tally.add(&if is_small || sizes.gzip <= MOST_SENT {
+                Tally::of_check(sizes.gzip <= MOST_SENT, &what)
+            } else {
+                Tally::skipped(format!("{what}: the standard library is the toolchain's own, which is larger"))
+            });
+        }
+        Err(error) => tally.add(&Tally::failed(error)),
+    }
+    match builder::named_in(&folder.join("ferrodrive.wasm")) {
+        Ok(named) => tally.add(&Tally::of_check(named.is_none(), &named.unwrap_or_default())),
+        Err(error) => tally.add(&Tally::failed(error)),
+    }
+    tally
+}
+
+fn said(sizes: &Sizes) -> String {
+    let Sizes { module_gzip, gzip, brotli } = sizes;
+    format!("{gzip} bytes in all by gzip -9, of which the module is {module_gzip}; {brotli} by brotli")
+}
+
+/// The types of the package, by a program that uses them.
+fn types() -> Tally {
+    let (name, version, file) = page::TYPESCRIPT;
+    match npm::install(name, version, file) {
+        Ok(compiler) => {
+            let mut node = Command::new("node");
+            node.current_dir(workspace::root().join("crates/web")).arg(compiler).args(["-p", "jsconfig.json"]);
+            match process::run(&mut node, |line| say(line)) {
+                Ok(ok) => Tally::of_check(ok, "types of the package"),
+                Err(error) => Tally::failed(error),
+            }
+        }
+        Err(reason) => Tally::skipped(reason),
+    }
 }
 
 /// What is made here.
@@ -108,162 +163,24 @@ fn may_be_replaced(folder: &Path) -> bool {
             .map_or_else(|error| error.kind() == io::ErrorKind::NotFound, |mut found| found.next().is_none())
 }
 
-/// Builds the module in a profile.
-fn module(rust: &Rust, profile: &str) -> Result<PathBuf, String> {
-    let words = ["rustc", "--profile", profile, "--package", "ferrodrive-web", "--crate-type", "cdylib"];
-    quietly(&mut rust.cargo(&words))?;
-    Ok(rust.built(profile).join("web.wasm"))
-}
-
-/// Makes the folder anew around a module.
-fn make(module: &Path, folder: &Path) -> Result<(), String> {
-    let _ = fs::remove_dir_all(folder);
-    let (own, page) = (workspace::root().join("crates/web"), workspace::root().join("crates/studio/page"));
-    for path in files(&page)?.into_iter().filter(|path| has_ending(path, &["js", "css"])) {
-        copy(&path, &folder.join("page").join(name(&path)))?;
-    }
-    for path in files(&own.join("js"))? {
-        copy(&path, &folder.join(name(&path)))?;
-    }
-    write_ordered(module, &folder.join("ferrodrive.wasm"))?;
-    write(&folder.join("index.html"), &index(&read(&page.join("index.html"))?, &own)?)?;
-    keep_offline(folder)?;
-    pack(folder)?;
-    let bytes: u64 = all_files(folder)?.iter().filter_map(|path| fs::metadata(path).ok()).map(|file| file.len()).sum();
-    say(format_args!("{bytes} bytes in all"));
-    Ok(())
-}
-
-/// Writes the module with its functions in an order that compresses well; as it is, if it has what is not known there.
-fn write_ordered(module: &Path, to: &Path) -> Result<(), String> {
-    let built = fs::read(module).map_err(|error| format!("{}: {error}", module.display()))?;
-    let ordered = wasm_order::ordered(&built).unwrap_or_else(|why| {
-        say(format_args!("the module's functions are left in their order: {why}"));
-        built
-    });
-    fs::write(to, ordered).map_err(|error| format!("{}: {error}", to.display()))
-}
-
-/// The studio's page that has its host in a worker.
-fn index(page: &str, own: &Path) -> Result<String, String> {
-    let examples = workspace::root().join("examples");
-    let machine = read(&own.join("machine.toml"))?;
-    let machines = [
-        ("A base, a joint, a stepper axis", machine.clone()),
-        ("A base on two hub motors", read(&examples.join("base.toml"))?),
-        ("A wheel, a joint and a stepper, with noise", read(&examples.join("machine.toml"))?),
-    ];
-    let machines: Vec<_> = machines.map(|(title, text)| json!({ "title": title, "text": text })).into();
-    let mut scenarios = Vec::new();
-    for path in files(&examples.join("scenarios"))?.iter().filter(|path| has_ending(path, &["toml"])) {
-        let text = read(path)?;
-        let title =
-            text.lines().find_map(|line| line.strip_prefix("title = ")).map(|title| title.trim_matches('"').to_owned());
-        // A page has no machine file beside a scenario.
-        if text.lines().any(|line| line.starts_with("machine =")) {
-            continue;
-        }
-        scenarios.push(json!({ "title": title.unwrap_or_else(|| name(path)), "text": text }));
-    }
-    let given = json!({ "machines": machines, "scenarios": scenarios }).to_string();
-    let head = format!(
-        "<meta http-equiv=\"content-security-policy\" content=\"{POLICY}\">\n<script type=\"application/json\" id=\"given\">{}</script>\n\
-         <script type=\"text/plain\" id=\"machine\">{machine}</script>\n<script type=\"module\" src=\"begin.js\"></script>\n",
-        // Where a script ends is decided before JSON is read.
-        given.replace('<', "\\u003c"),
-    );
-    let changes = [
-        ("<html lang=\"en\">", "<html lang=\"en\" data-worker=\"worker.js\">".to_owned()),
-        ("<meta charset=\"utf-8\">\n", format!("<meta charset=\"utf-8\">\n{head}")),
-        ("</head>", "<link rel=\"stylesheet\" href=\"web.css\">\n<script type=\"module\" src=\"machines.js\"></script>\n<script type=\"module\" src=\"serial.js\"></script>\n</head>".to_owned()),
-    ];
-    changes.iter().try_fold(page.to_owned(), |page, (from, to)| {
-        if page.matches(from).count() != 1 {
-            Err(format!("the page has not one {from:?}"))
-        } else {
-            Ok(page.replace(from, to))
-        }
-    })
-}
-
-/// Writes into the service worker which files there are, and a name for this very content.
-fn keep_offline(folder: &Path) -> Result<(), String> {
-    let (mut list, mut sum) = (vec!["./".to_owned(), "index.html".to_owned()], Sha256::new());
-    for path in all_files(folder)? {
-        sum.update(fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?);
-        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
-        if has_ending(&path, &["js", "css", "wasm"]) && name != "offline.js" {
-            list.push(name);
+/// Makes the page in a folder; returns what could not be done to make it small.
+fn make(rust: &Rust, folder: &Path) -> Result<Vec<String>, String> {
+    const PROFILE: &str = "web";
+    let words = ["rustc", "--profile", PROFILE, "--package", "ferrodrive-web", "--crate-type", "cdylib"];
+    let mut cargo = rust.cargo(&words);
+    builder::leave_out(&mut cargo);
+    quietly(cargo.arg("--").arg(format!("-Clink-arg=--max-memory={MOST_MEMORY}")))?;
+    let (built, small) = (rust.built(PROFILE).join("web.wasm"), self::folder().join("ferrodrive.wasm"));
+    let mut notes = Vec::new();
+    // `wasm-opt -Oz` (binaryen 132) makes it 10 % smaller, and 9 kB larger when compressed and ordered behind it.
+    match site::ordered(&built) {
+        Ok(ordered) => fs::write(&small, ordered).map_err(|error| format!("{}: {error}", small.display()))?,
+        Err(why) => {
+            notes.push(why);
+            fs::copy(&built, &small).map_err(|error| format!("{}: {error}", small.display()))?;
         }
     }
-    let version: String = sum.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-    let path = folder.join("offline.js");
-    let text = format!("const VERSION = {version:?};\nconst FILES = {};\n\n{}", json!(list), read(&path)?);
-    write(&path, &text)
-}
-
-/// The package for npm, in `ferrodrive-VERSION.tgz` of the folder.
-fn pack(folder: &Path) -> Result<(), String> {
-    let package = self::folder().join("npm");
-    let _ = fs::remove_dir_all(&package);
-    for name in ["ferrodrive.js", "ferrodrive.d.ts", "ferrodrive.wasm"] {
-        copy(&folder.join(name), &package.join(name))?;
-    }
-    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
-        copy(&workspace::root().join(name), &package.join(name))?;
-    }
-    copy(&workspace::root().join("crates/web/README.md"), &package.join("README.md"))?;
-    let manifest = json!({
-        "name": "ferrodrive",
-        "version": env!("CARGO_PKG_VERSION"),
-        "description": "CANopen motor drives as firmware and physics in virtual time, for pages and node",
-        "license": "MIT OR Apache-2.0",
-        "type": "module",
-        "exports": { ".": { "types": "./ferrodrive.d.ts", "default": "./ferrodrive.js" } },
-        "types": "./ferrodrive.d.ts",
-        "engines": { "node": ">=18" },
-        "keywords": ["canopen", "cia402", "can", "servo", "simulation"],
-    });
-    write(&package.join("package.json"), &format!("{manifest:#}\n"))?;
-    if !process::works("npm", &["--version"]) {
-        say("no package for npm: npm is not installed");
-        return Ok(());
-    }
-    quietly(
-        Command::new("npm")
-            .current_dir(&package)
-            .args(["pack", "--offline", "--pack-destination"])
-            .arg(absolute(folder)?),
-    )
-}
-
-fn absolute(path: &Path) -> Result<PathBuf, String> {
-    std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()))
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    path.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known))
-}
-
-/// The files of a folder, in order.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    let mut paths: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).collect();
-    paths.sort();
-    Ok(paths)
-}
-
-/// The files of a page.
-fn all_files(folder: &Path) -> Result<Vec<PathBuf>, String> {
-    Ok([files(folder)?, files(&folder.join("page"))?].concat())
-}
-
-fn read(path: &Path) -> Result<String, String> {
-    fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+    site::make(&small, folder).map(|()| notes)
 }
 
 #[cfg(test)]

@@ -75,8 +75,12 @@ export const tellWorker = (message) => worker?.postMessage(message);
 function machine() {
   if (serial) return { serial };
   const kept = sessionStorage.getItem("machine");
-  return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
+  const { machine: text, files } = kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
+  return { machine: text, files, stored: JSON.parse(localStorage.getItem(storeOf(text)) ?? "[]") };
 }
+
+/** Where the browser keeps what the drives of a machine have stored. */
+export const storeOf = (machine) => `stored ${machine}`;
 
 /**
  * A request to the host: `fetch` with a path.

@@ -13,12 +13,28 @@ export type Command = { do: string } & Record<string, unknown>;
 /** The answer to a world command. */
 export type WorldAnswer = { ok: boolean; t: number } & Record<string, unknown>;
 
+/** What a drive has stored: its number, its model, and the content of its memory as hexadecimal digits. */
+export interface Stored {
+  number: number;
+  model: string;
+  image: string;
+}
+
 /** A machine of virtual drives with its host, in virtual time. */
 export class World {
   /** The machine of a machine file (TOML); refused with all that is wrong with it. */
   static open(
     machine: string,
-    options?: { files?: Files; unix_ms?: number; onmessage?: ((line: string) => void) | null },
+    options?: {
+      files?: Files;
+      unix_ms?: number;
+      /** What its drives have stored before; what cannot be used is said by `onunusable`, and that drive begins as from the factory. */
+      stored?: Stored[];
+      onunusable?: ((why: string) => void) | null;
+      /** What a drive stores: it acknowledges that when this has returned, or when its promise is kept. */
+      onstored?: ((stored: Stored) => void | Promise<void>) | null;
+      onmessage?: ((line: string) => void) | null;
+    },
   ): Promise<World>;
   private constructor();
   /** The time of the world, in seconds since its power came on. */

@@ -35,6 +35,10 @@ async function compileFrom(url) {
   return WebAssembly.compile(await answer.arrayBuffer());
 }
 
+/** The unit of the module's memory, in bytes, and so many as one step of a world takes at most. */
+const PAGE = 65_536;
+const ROOM_PAGES = 1024;
+
 const bytes = (body) => (typeof body === "string" ? new TextEncoder().encode(body) : new Uint8Array(body));
 const text = (body) => new TextDecoder().decode(body);
 
@@ -51,6 +55,18 @@ export class Library {
     return new Uint8Array(this.exports.memory.buffer, this.exports.answer(), length).slice();
   }
 
+  /** What has ended the module without a word. There is hardly room for more where a piece of memory was refused. */
+  #diagnosis(trap, length) {
+    const { memory } = this.exports;
+    const held = memory.buffer.byteLength;
+    try {
+      memory.grow(ROOM_PAGES + Math.ceil((2 * length) / PAGE));
+    } catch {
+      return `out of memory: the module has taken ${Math.round(held / 2 ** 20)} MiB of at most 1024`;
+    }
+    return `a defect of Ferrodrive; please report it with what was done: ${trap.message}`;
+  }
+
   call(head, body = "") {
     const line = bytes(`${JSON.stringify(head)}\n`);
     const behind = bytes(body);
@@ -63,7 +79,7 @@ export class Library {
       answer = this.#answer(this.exports.call());
     } catch (trap) {
       const said = this.#answer(this.exports.answer_length());
-      throw new Error(said.length ? JSON.parse(text(said)).error.message : `out of memory, or a defect: ${trap.message}`, { cause: trap });
+      throw new Error(said.length ? JSON.parse(text(said)).error.message : this.#diagnosis(trap, line.length + behind.length), { cause: trap });
     }
     const end = answer.indexOf(10);
     const read = JSON.parse(text(answer.subarray(0, end)));
@@ -80,14 +96,20 @@ export class World {
   #word = null;
   #answers = new Map();
   #listener = null;
+  #keep = null;
 
-  /** The machine of a machine file (TOML). `files` are data sheets that it names: name to content. */
-  static async open(machine, { files = {}, unix_ms = 0, onmessage = null } = {}) {
+  /**
+   * The machine of a machine file (TOML). `files` are data sheets that it names: name to content. `onstored` is called with what a drive stores,
+   * `{ number, model, image }`, and the drive acknowledges it when it returns, or when its promise is kept; `stored` are those of before.
+   */
+  static async open(machine, { files = {}, unix_ms = 0, stored = [], onmessage = null, onstored = null, onunusable = null } = {}) {
     const world = new World();
     world.#library = await Library.make();
-    world.#listener = onmessage;
+    [world.#listener, world.#keep] = [onmessage, onstored];
     for (const [name, content] of Object.entries(files)) world.#library.call({ call: "give", name }, content);
-    world.#now_ns = world.#library.call({ call: "open", unix_ms }, machine).now_ns;
+    const { now_ns, unusable } = world.#library.call({ call: "open", unix_ms, stored, keeps: onstored !== null }, machine);
+    world.#now_ns = now_ns;
+    for (const why of unusable) onunusable?.(why);
     world.run(0);
     return world;
   }
@@ -107,8 +129,14 @@ export class World {
   }
 
   #runTo(to_ns) {
-    const { now_ns, body } = this.#library.call({ call: "run", to_ns });
+    const { now_ns, stored, body } = this.#library.call({ call: "run", to_ns });
     this.#now_ns = now_ns;
+    for (const { generation, ...image } of stored) {
+      const confirm = () => this.#library.call({ call: "kept", number: image.number, generation });
+      const kept = this.#keep(image);
+      if (kept?.then) kept.then(confirm);
+      else confirm();
+    }
     if (body.length === 0) return;
     for (const line of text(body).split("\n")) this.#take(line);
   }

@@ -2,12 +2,17 @@
 
 import { choice } from "./page/choice.js";
 import { h } from "./page/dom.js";
+import { link, on } from "./page/link.js";
+import { report } from "./page/main.js";
+import { storeOf, tellWorker } from "./page/transport.js";
 
 const given = JSON.parse(document.getElementById("given").textContent);
 const LARGEST_FILE = 2 ** 20;
 
-/** This tab has this machine from now on. */
-function begin(machine, files = {}) {
+/** This tab has this machine from now on. With `keeps` its drives have what those of the machine before have stored. */
+function begin(machine, files = {}, keeps = false) {
+  const stored = localStorage.getItem(storeOf(present().machine));
+  if (keeps && stored) localStorage.setItem(storeOf(machine), stored);
   sessionStorage.setItem("machine", JSON.stringify({ machine, files }));
   location.reload();
 }
@@ -45,13 +50,14 @@ function play({ title, text, files = {} }) {
   worker.onmessage = ({ data }) => {
     worker.terminate();
     say("");
-    show(title, data);
+    show(title, Object.keys(files).length ? null : text, data);
   };
   worker.onerror = (event) => say(`${title}: ${event.message ?? "it cannot be run"}`);
   worker.postMessage({ scenario: text, files });
 }
 
-function show(title, { outcome, error }) {
+/** `text` is the scenario, if it is all in one file. */
+function show(title, text, { outcome, error }) {
   const rows = (outcome?.rows ?? []).map((row) =>
     h("tr", { class: row.verdict === "passed" ? "" : "bad" }, ...[row.t === null ? "–" : `${row.t.toFixed(3)} s`, row.kind, row.name, row.asked, row.seen, row.verdict].map((cell) => h("td", {}, cell))),
   );
@@ -59,25 +65,30 @@ function show(title, { outcome, error }) {
   const found = outcome
     ? h("p", {}, `${outcome.ok ? "As expected" : "NOT as expected"}: ${outcome.end_s.toFixed(3)} s of virtual time, seed ${outcome.seed}, digest ${outcome.digest}`)
     : h("p", { class: "bad" }, error);
-  const dialog = h("dialog", { id: "scenario" }, h("button", { type: "button", onclick: () => dialog.remove() }, "Close"), h("h2", {}, title), found, h("table", {}, h("thead", {}, heads), h("tbody", {}, ...rows)));
+  const to_scenario = text === null ? [] : [h("button", { type: "button", id: "scenario-link", title: "Copy a link that plays this scenario", onclick: () => copy("scenario", text) }, "Link")];
+  const dialog = h("dialog", { id: "scenario" }, h("button", { type: "button", class: "close", onclick: () => dialog.remove() }, "Close"), ...to_scenario, h("h2", {}, title), found, h("table", {}, h("thead", {}, heads), h("tbody", {}, ...rows)));
   document.getElementById("scenario")?.remove();
   document.body.append(dialog);
   dialog.show();
 }
 
 /** The address with this machine. Data sheets are not in it. */
-async function copyLink() {
+function copyLink() {
   const { machine, files } = present();
-  const url = new URL(location.href);
-  url.hash = `machine=${encodeURIComponent(machine)}`;
   if (Object.keys(files).length) return say("A machine with data sheets is too large for a link: hand on its files");
+  copy("machine", machine);
+}
+
+async function copy(what, text) {
+  const url = new URL(location.href);
+  url.hash = `${what}=${encodeURIComponent(text)}`;
   try {
     await navigator.clipboard.writeText(url.href);
-    say("The link is copied: it holds the machine");
+    say(`The link is copied: it holds the ${what}`);
   } catch {
     // Without the event of a changed address, which shows another view.
     history.replaceState(null, "", url);
-    say("The address holds the machine now");
+    say(`The address holds the ${what} now`);
   }
 }
 
@@ -97,7 +108,8 @@ async function take(files) {
   if (file_of) return begin(file_of.text, { ...present().files, ...sheets });
   // A device joins the machine at the next free node-ID.
   const { machine, files: kept } = present();
-  const taken = [...machine.matchAll(/^\s*node\s*=\s*(\d+)/gm)].map(([, node]) => Number(node));
+  const written = [...machine.matchAll(/\bnode\s*=\s*(0x[\da-f]+|0o[0-7]+|0b[01]+|\d+)/gi)].map(([, node]) => Number(node));
+  const taken = [...written, ...(link.state?.nodes ?? []).map(({ node }) => node)];
   let text = machine;
   for (const name of Object.keys(sheets)) {
     const node = Array.from({ length: 127 }, (_, at) => at + 1).find((free) => !taken.includes(free));
@@ -105,9 +117,13 @@ async function take(files) {
     taken.push(node);
     text += `\n[[drive]]\nmodel = ${JSON.stringify(name)}\nnode = ${node}\n`;
   }
-  begin(text, { ...kept, ...sheets });
+  begin(text, { ...kept, ...sheets }, true);
 }
 
+const forget = h("button", { type: "button", id: "machine-forget", title: "Begin anew with drives as they left the factory: what those of this machine have stored is lost", hidden: localStorage.getItem(storeOf(present().machine)) === null, onclick: () => {
+  localStorage.removeItem(storeOf(present().machine));
+  location.reload();
+} }, "Factory state");
 const input = h("input", { type: "file", id: "machine-file", multiple: true, accept: ".toml,.eds,.dcf", hidden: true, onchange: () => take(input.files) });
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
@@ -120,8 +136,38 @@ document.getElementById("top").append(
   input,
   h("button", { type: "button", id: "machine-open", title: "Open a machine file, a scenario, or a data sheet, which joins the machine; or drop it on the page", onclick: () => input.click() }, "File …"),
   h("button", { type: "button", id: "machine-link", title: "Copy a link to this machine", onclick: copyLink }, "Link"),
+  forget,
   status,
 );
 
-// Offline once loaded, where the page has come over https or from this machine.
-navigator.serviceWorker?.register("offline.js").catch(() => {});
+// What a drive stores is kept by the browser for the machine, and acknowledged by the drive when it is.
+addEventListener("stored", ({ detail: { image, kept } }) => {
+  const key = storeOf(present().machine);
+  try {
+    const others = JSON.parse(localStorage.getItem(key) ?? "[]").filter(({ number }) => number !== image.number);
+    localStorage.setItem(key, JSON.stringify([...others, image]));
+    forget.hidden = false;
+  } catch (error) {
+    report("Storage", { ok: false, error: { message: `what drive ${image.number} has stored lasts as long as this page: the browser does not keep it (${error.message})` } });
+  }
+  tellWorker({ kept });
+});
+addEventListener("unusable", ({ detail }) => report("Storage", { ok: false, error: { message: detail } }));
+
+addEventListener("skipped", ({ detail }) => {
+  report("Time", { ok: true, notes: [`this page was held up, or its computer slept: ${(detail / 1000).toFixed(1)} s of the drives' time are left out`] });
+});
+
+const to_play = sessionStorage.getItem("play");
+if (to_play !== null) {
+  sessionStorage.removeItem("play");
+  play({ title: /^title\s*=\s*"(.*)"\s*$/m.exec(to_play)?.[1] ?? "Scenario of the link", text: to_play });
+}
+
+// Offline once loaded, where the page has come over https or from this machine. What is kept for that does not delay the first picture.
+let is_kept = false;
+on("state", ({ scanning }) => {
+  if (is_kept || scanning) return;
+  is_kept = true;
+  navigator.serviceWorker?.register("offline.js").catch(() => {});
+});

@@ -36,7 +36,9 @@ async function begin() {
 
 const lacking = !isSecureContext
   ? "Browsers open serial ports for pages from https or from this machine alone: this one is neither."
-  : "This browser has no Web Serial. Chrome, Edge, Opera and Chromium on a computer have it; Firefox and Safari do not. Without it the program ferrodrive reaches the same adapters.";
+  : "This browser has no Web Serial. Chrome, Edge, Opera and Chromium on a computer have it, and Firefox from version 151 on; Safari does not. Without it the program ferrodrive reaches the same adapters.";
+const lacking_in_workers =
+  "This browser has Web Serial for pages and not for workers: a page that hangs could stop nothing there. Chrome, Edge, Opera and Chromium on a computer have both. Without it the program ferrodrive reaches the same adapters.";
 
 const item = (text) => h("li", {}, text);
 const dialog = h(
@@ -60,9 +62,22 @@ const dialog = h(
 );
 document.body.append(dialog);
 
+/** The host is in a worker: whether it can open the port is asked of one, before an adapter is chosen. */
+function askWorker() {
+  if (!("serial" in navigator)) return;
+  const worker = new Worker("serial_worker.js", { type: "module" });
+  worker.postMessage({ probe: true });
+  worker.onmessage = ({ data }) => {
+    worker.terminate();
+    if (data.has_serial) return;
+    ready.closest(".row").remove();
+    dialog.append(h("p", { class: "bad", id: "serial-lacking" }, lacking_in_workers));
+  };
+}
+
 const top = document.getElementById("top");
 const status = h("span", { id: "serial-status", role: "status" });
-top.append(h("button", { type: "button", id: "serial-open", title: "Real drives, by a serial CAN adapter", onclick: () => dialog.show() }, "Cable …"), status);
+top.append(h("button", { type: "button", id: "serial-open", title: "Real drives, by a serial CAN adapter", onclick: () => (dialog.show(), askWorker()) }, "Cable …"), status);
 
 const alert = h("div", { id: "serial-alert", role: "alert", hidden: true });
 document.getElementById("alerts").prepend(alert);

@@ -213,12 +213,15 @@ function say({ say }) {
   run();
 }
 
+/** Whether this browser has Web Serial for workers: the host has to be where a page that hangs does not reach. */
+const probe = () => postMessage({ has_serial: "serial" in navigator });
+
 const take_leave = () => run("leave");
 
 // One after the other: a message that comes while the module loads waits for it. What stops does not wait.
 let queue = Promise.resolve();
 addEventListener("message", ({ data }) => {
   if (data.let_go !== undefined) return library && run({ let_go: data.let_go });
-  const does = data.open ? open : data.leave ? take_leave : data.say !== undefined ? say : answer;
+  const does = data.probe ? probe : data.open ? open : data.leave ? take_leave : data.say !== undefined ? say : answer;
   queue = queue.then(() => does(data)).catch(end);
 });

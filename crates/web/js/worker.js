@@ -11,6 +11,9 @@ const MOST_MS = 20;
 /** A world that is further behind does not catch up: the machine slept, or is too slow. */
 const MOST_BEHIND_MS = 250;
 
+/** How often time that is left out is said. */
+const SAY_MS = 1000;
+
 let world = null;
 /** What the clock showed at the world's zero. */
 let zero_ms = 0;
@@ -21,9 +24,25 @@ function end(error) {
   close();
 }
 
+/** Time that was left out and not said yet, and when some was said. */
+let skipped_ms = 0;
+let said_at = -Infinity;
+
+function skip(ms) {
+  zero_ms += ms;
+  skipped_ms += ms;
+}
+
+function saySkipped() {
+  if (skipped_ms === 0 || performance.now() - said_at < SAY_MS) return;
+  postMessage({ event: "skipped", detail: skipped_ms });
+  [skipped_ms, said_at] = [0, performance.now()];
+}
+
 function tick() {
   const behind = performance.now() - zero_ms - world.now * 1000;
-  if (behind > MOST_BEHIND_MS) zero_ms += behind - MOST_MS;
+  if (behind > MOST_BEHIND_MS) skip(behind - MOST_MS);
+  saySkipped();
   try {
     if (behind > 0) world.run(Math.min(behind, MOST_MS) / 1000);
   } catch (error) {
@@ -31,9 +50,20 @@ function tick() {
   }
 }
 
-async function open({ machine, files }) {
+/** What waits for the page to have kept it. */
+const keeping = new Map();
+
+const keep = (image) =>
+  new Promise((resolve) => {
+    const kept = keeping.size + performance.now();
+    keeping.set(kept, resolve);
+    postMessage({ event: "stored", detail: { image, kept } });
+  });
+
+async function open({ machine, files, stored }) {
   if (world) return world.join();
-  world = await World.open(machine, { files, unix_ms: Date.now(), onmessage: (text) => postMessage({ text }) });
+  const onunusable = (why) => postMessage({ event: "unusable", detail: why });
+  world = await World.open(machine, { files, stored, unix_ms: Date.now(), onmessage: (text) => postMessage({ text }), onstored: keep, onunusable });
   zero_ms = performance.now() - world.now * 1000;
   setInterval(tick, TICK_MS);
 }
@@ -46,6 +76,7 @@ async function answer({ request, path, body }) {
 // One after the other: a message that comes while the module loads waits for it.
 let queue = Promise.resolve();
 addEventListener("message", ({ data }) => {
+  if (data.kept !== undefined) return keeping.get(data.kept)?.();
   const take = data.open ? open : data.say !== undefined ? ({ say }) => world.say(say) : answer;
   queue = queue.then(() => take(data)).catch(end);
 });

@@ -3,20 +3,22 @@
 // SITE, FERRODRIVE and SCENARIOS are those of engines.test.js; FIREFOX is the browser, where it has another path.
 
 import assert from "node:assert/strict";
-import { execFileSync, spawn, spawnSync } from "node:child_process";
-import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
+import { spawn, spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join, normalize } from "node:path";
 import { test } from "node:test";
 
-const { SITE, FERRODRIVE, SCENARIOS, FIREFOX = "firefox-esr" } = process.env;
+import { natively, scenarios } from "../site_tools/scenarios.js";
+
+const { SITE, FIREFOX = "firefox-esr" } = process.env;
 const KINDS = { ".js": "text/javascript", ".wasm": "application/wasm" };
 const PAGE = `<!doctype html><script type="module">
 import { runScenario } from "./ferrodrive.js";
 const digests = {};
 try {
-  for (const [name, text] of await (await fetch("/scenarios")).json()) digests[name] = (await runScenario(text)).digest;
+  for (const { name, text, files } of await (await fetch("/scenarios")).json()) digests[name] = (await runScenario(text, { files })).digest;
 } catch (error) { digests.error = String(error); }
 await fetch("/digests", { method: "POST", body: JSON.stringify(digests) });
 </script>`;
@@ -24,7 +26,6 @@ await fetch("/digests", { method: "POST", body: JSON.stringify(digests) });
 const missing = spawnSync(FIREFOX, ["--version"]).status === 0 ? false : `${FIREFOX} does not run here: install firefox-esr`;
 
 test("each scenario in Firefox is the same run as the native one", { skip: missing, timeout: 120_000 }, async ({ signal }) => {
-  const names = readdirSync(SCENARIOS).filter((name) => name.endsWith(".toml"));
   const profile = mkdtempSync(join(tmpdir(), "firefox-"));
   let receive;
   const received = new Promise((resolve) => { receive = resolve; });
@@ -36,7 +37,7 @@ test("each scenario in Firefox is the same run as the native one", { skip: missi
       response.end();
       receive(JSON.parse(body));
     } else if (path === "/scenarios") {
-      response.end(JSON.stringify(names.map((name) => [name, readFileSync(join(SCENARIOS, name), "utf8")])));
+      response.end(JSON.stringify(scenarios));
     } else if (path === "/probe.html") {
       response.writeHead(200, { "content-type": "text/html" }).end(PAGE);
     } else if (KINDS[extname(path)]) {
@@ -55,8 +56,7 @@ test("each scenario in Firefox is the same run as the native one", { skip: missi
   });
   try {
     const digests = await Promise.race([received, silent]);
-    const native = (name) => JSON.parse(execFileSync(FERRODRIVE, ["run", "--json", join(SCENARIOS, name)], { encoding: "utf8" })).digest;
-    assert.deepEqual(digests, Object.fromEntries(names.map((name) => [name, native(name)])));
+    assert.deepEqual(digests, Object.fromEntries(scenarios.map((scenario) => [scenario.name, natively(scenario).digest])));
   } finally {
     silent.catch(() => {});
     browser.kill();

@@ -6,7 +6,7 @@ import { spawn } from "node:child_process";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 
-import { PATIENCE_MS, address, begin, command, end, go, picture, run, server, until } from "../site_tools/browser.js";
+import { MODULES, PATIENCE_MS, address, begin, command, end, go, picture, press, run, server, until } from "../site_tools/browser.js";
 import { Adapter } from "../site_tools/serial_port.js";
 
 let sim, adapter, lines;
@@ -47,7 +47,7 @@ async function eventually(what, is_so) {
 
 const stands = (node) => eventually(`node ${node} stands`, async () => Math.abs((await drive(node)).velocity_rpm) < 1);
 
-const LINK = `const { ask, link } = await import(new URL("page/link.js", location.href)); if (!link.fresh) return null;`;
+const LINK = `${MODULES} if (!link.fresh) return null;`;
 const text = (id) => run(`return document.getElementById("${id}")?.innerText ?? ""`);
 
 /** Chooses the adapter as a person does, and waits until the channel is open and both drives are found. */
@@ -55,6 +55,9 @@ async function attach(bitrate = "500k") {
   await until("the button", "const button = document.getElementById('serial-open'); button?.click(); return button !== null");
   await run(`document.querySelector("#serial-bitrate button").click(); document.querySelector("#serial-bitrate li[data-value='${bitrate}']").click(); return true`);
   assert.equal(await run("return document.getElementById('serial-choose').disabled"), true, "before an emergency stop is at hand");
+  const said = await text("serial");
+  assert.match(said, /Real motors will turn[^]*This page stops what it moved when[^]*STOP, Esc or Space[^]*the tab is hidden, closed or loaded again[^]*hangs for 3 s/);
+  assert.match(said, /It cannot stop anything when[^]*the machine sleeps[^]*the adapter or its cable is pulled out[^]*only a drive's own watch/);
   await run("document.getElementById('serial-ready').click(); return true");
   await picture("serial_dialog");
   await run("document.getElementById('serial-choose').click(); return true");
@@ -111,6 +114,27 @@ test("a drive that nothing would stop moves only after that was accepted", async
   assert.ok(Math.abs((await drive(2)).velocity_rpm) < 1);
 });
 
+test("the keyboard stops what turns, and so does a jog that is let go", async () => {
+  await found();
+  for (const key of ["\ue00c", " "]) {
+    await turn();
+    await run("document.activeElement.blur(); return true");
+    await press(key);
+    await stops();
+  }
+  await run("location.hash = 'bus'; return true");
+  await until("the wheel is chosen", "const row = [...document.querySelectorAll('#view table tbody tr')].find((one) => parseInt(one.innerText) === 4); row?.click(); return row !== undefined");
+  await run("location.hash = 'motion'; return true");
+  await until("control", `${LINK} if (link.state.controller === null) await ask({ do: "take_control" }); return modules["link.js"].inControl()`);
+  const { x, y } = await until("the button of the jog", `const button = document.querySelectorAll("#view button.jog")[1]; if (!button || button.disabled) return null; button.scrollIntoView({ block: "center" }); const { x, y, width, height } = button.getBoundingClientRect(); return { x: Math.round(x + width / 2), y: Math.round(y + height / 2) }`);
+  adapter.heard = "";
+  const pointer = (actions) => command("POST", "/actions", { actions: [{ type: "pointer", id: "mouse", parameters: { pointerType: "mouse" }, actions }] });
+  await pointer([{ type: "pointerMove", duration: 0, x, y }, { type: "pointerDown", button: 0 }]);
+  await eventually("the jog turns", async () => Math.abs((await drive(4)).velocity_rpm) > 5);
+  await pointer([{ type: "pointerUp", button: 0 }]);
+  await stands(4);
+});
+
 test("a tab that is hidden stops what it moved, and has to take control anew", async () => {
   await turn();
   const before = await command("GET", "/window");
@@ -138,7 +162,7 @@ test("a tab that the browser freezes moves nothing, nor when it goes on", async 
 test("a page that hangs is stopped by its worker, and takes no state that has waited for it for a current one", async () => {
   await turn();
   // A request that blocks the page, until the drive was seen to stand. Of what has come meanwhile it is noted how it is taken.
-  const hangs = run(`const { link, on } = await import(new URL("page/link.js", location.href));
+  const hangs = run(`${MODULES}
     const request = new XMLHttpRequest();
     request.open("GET", "/hang", false);
     const taken = [];
@@ -183,7 +207,7 @@ test("a cable that is pulled is said with what may still move, and what moved is
 test("a host that ends leaves a word of what may still move", async () => {
   await turn();
   // What it does not understand ends it, as a defect would.
-  await run(`const { tellWorker } = await import(new URL("page/transport.js", location.href)); tellWorker({ let_go: {} }); return true`);
+  await run(`${MODULES} modules["transport.js"].tellWorker({ let_go: {} }); return true`);
   await until("what may be moving", `return /The host in this page has ended.*node 4 may still be moving.*without this page/s.test(document.getElementById("serial-alert").innerText)`);
   await picture("serial_ended");
   await stands(4);
@@ -250,7 +274,7 @@ test("a wrong bit rate is said", async () => {
   await until("why", `return /the adapter refused 'O': is the bit rate right\\?/.test(document.getElementById("serial-status").innerText)`);
   assert.match(await text("serial-alert"), /No bus yet/);
   // At once: a page takes a worker that does not answer for dead.
-  const state = await run(`const { request } = await import(new URL("page/transport.js", location.href)); const answer = await request("/api/state"); return [answer.status, (await answer.json()).error.kind]`);
+  const state = await run(`${MODULES} const answer = await modules["transport.js"].request("/api/state"); return [answer.status, (await answer.json()).error.kind]`);
   assert.deepEqual(state, [503, "no_bus"]);
   assert.ok(!/does not admit/.test(await run("return document.body.innerText")));
   await picture("serial_refused");
@@ -262,6 +286,12 @@ test("the browser has Web Serial in workers; one that has none says what does", 
   await run("sessionStorage.clear(); return true");
   await go(`${address}?lacking`);
   await until("the button", "const button = document.getElementById('serial-open'); button?.click(); return button !== null");
-  assert.match(await text("serial-lacking"), /has no Web Serial.*Firefox and Safari do not/);
+  assert.match(await text("serial-lacking"), /has no Web Serial.*Firefox from version 151 on; Safari does not/);
+  assert.equal(await run("return document.getElementById('serial-choose')"), null);
+  // One that has it for pages alone.
+  await go(`${address}?pages`);
+  await run(`window.Worker = class { terminate() {} postMessage() { setTimeout(() => this.onmessage({ data: { has_serial: false } })); } }; return true`);
+  await until("the button", "const button = document.getElementById('serial-open'); button?.click(); return button !== null");
+  await until("why", "return document.getElementById('serial-lacking')?.innerText.includes('for pages and not for workers')");
   assert.equal(await run("return document.getElementById('serial-choose')"), null);
 });

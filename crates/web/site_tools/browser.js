@@ -1,6 +1,7 @@
 // Headless Chromium with the page of SITE, from a folder below a static host's root, moved by its WebDriver.
 
 import { spawn } from "node:child_process";
+import { createHash } from "node:crypto";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
@@ -13,15 +14,30 @@ const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/cs
 export const PATIENCE_MS = 120_000;
 
 let driver, session, profile;
-/** The paths that the browser has asked for. */
+/** The paths that the browser has asked for, and those of files that were sent, because the browser did not have them. */
 export const asked = [];
+export const sent = [];
 export let server, address;
 
-/** Sends a file compressed, as static hosts do, on a line of so many Mbit/s that all files share. */
-function slowly(mbit_s) {
+/** For scripts in the page: its modules by their names, and what most scripts need of them. */
+export const MODULES = `const { modules } = await import(new URL("page/bundle.js", location.href));
+  const { ask, link, on } = modules["link.js"];`;
+
+/** The policy that the page sets, for a server that sends it as a header. */
+export const policy = () => /<meta http-equiv="content-security-policy" content="([^"]*)">/.exec(readFileSync(join(SITE, "index.html"), "utf8"))[1];
+
+/**
+ * Sends a file compressed, as static hosts do, on a line of so many Mbit/s that all files share, after a round trip; on a new connection after one
+ * more.
+ */
+function slowly(mbit_s, rtt_ms) {
   const PIECE = 16_384;
   let free_at = 0;
+  const known = new WeakSet();
   return async (answer, content) => {
+    const trips = known.has(answer.socket) ? 1 : 2;
+    known.add(answer.socket);
+    await new Promise((resolve) => setTimeout(resolve, trips * rtt_ms));
     const bytes = gzipSync(content, { level: 9 });
     for (let at = 0; at < bytes.length; at += PIECE) {
       const piece = bytes.subarray(at, at + PIECE);
@@ -33,19 +49,25 @@ function slowly(mbit_s) {
   };
 }
 
-/** `answered` may answer a request in place of the folder, by returning true; `changed` may change the text of a file. */
-function serve({ answered = () => false, changed = (_, content) => content, mbit_s = null }) {
-  const send = mbit_s && slowly(mbit_s);
+/**
+ * `answered` may answer a request in place of the folder, by returning true; `changed` may change the text of a file; `headers` come with each of them.
+ * A file that the browser has by its tag is not sent again, as by static hosts.
+ */
+function serve({ answered = () => false, changed = (_, content) => content, headers = {}, mbit_s = null, rtt_ms = 0 }) {
+  const send = mbit_s && slowly(mbit_s, rtt_ms);
   server = createServer((request, answer) => {
     const path = new URL(request.url, "http://host").pathname;
     asked.push(path);
     if (answered(path, answer)) return;
     const name = normalize(path.replace(/^\/try\//, "")) || "index.html";
     try {
-      const content = readFileSync(join(SITE, name === "." ? "index.html" : name));
-      const type = { "content-type": TYPES[extname(name)] ?? "text/html" };
+      const content = changed(name, readFileSync(join(SITE, name === "." ? "index.html" : name)));
+      const etag = `"${createHash("sha1").update(content).digest("hex")}"`;
+      const type = { ...headers, etag, "content-type": TYPES[extname(name)] ?? "text/html" };
+      if (request.headers["if-none-match"] === etag) return void answer.writeHead(304, type).end();
+      sent.push(path);
       if (send) send(answer.writeHead(200, { ...type, "content-encoding": "gzip" }), content);
-      else answer.writeHead(200, type).end(changed(name, content));
+      else answer.writeHead(200, type).end(content);
     } catch {
       answer.writeHead(404).end();
     }
@@ -64,6 +86,10 @@ async function webdriver(method, path, body) {
 export const command = (method, path, body) => webdriver(method, `/${session}${path}`, body);
 
 export const go = (url) => command("POST", "/url", { url });
+
+/** Presses keys, one after the other, where the focus is. */
+export const press = (keys) =>
+  command("POST", "/actions", { actions: [{ type: "key", id: "keys", actions: [...keys].flatMap((value) => [{ type: "keyDown", value }, { type: "keyUp", value }]) }] });
 
 export const run = (script, ...args) => command("POST", "/execute/async", { script: `const done = arguments[arguments.length - 1]; (async () => { ${script} })().then(done, (error) => done({ failed: String(error) }));`, args });
 

@@ -69,7 +69,7 @@ export class Adapter {
         answer.writeHead(200, { "content-type": "application/json" }).end(String(this.chosen && this.plugged));
         return true;
       },
-      changed: (name, content) => (["begin.js", "serial_worker.js"].includes(name) ? MOCK + content : content),
+      changed: (name, content) => (["page/bundle.js", "serial_worker.js"].includes(name) ? MOCK + content : content),
     };
   }
 

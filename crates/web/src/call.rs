@@ -6,28 +6,43 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use scenario::{Runner, Scenario};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
+use sim::StoredImage;
 use words::document::give;
 
-use crate::hosted_world::{Failed, HostedWorld};
+use crate::hosted_world::{Failed, HostedWorld, Stored};
 use crate::requests::{Request, Response};
 use crate::serial_host::{Line, SerialHost};
 
-/// The first line of a call. What else it needs is its body.
+/// The first line of a call, by the word in its field `call`. What else it needs is its body.
 #[derive(Debug, Deserialize)]
-#[serde(tag = "call", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Call {
     /// A world of the machine file in the body, which replaces the one before.
     Open {
         /// Unix time of the world's zero, for logs.
         #[serde(default)]
         unix_ms: u64,
+        /// What its drives have stored before.
+        #[serde(default)]
+        stored: Vec<StoredText>,
+        /// The caller keeps what drives store: a drive acknowledges it when `kept` has come.
+        #[serde(default)]
+        keeps: bool,
+    },
+    /// A content that `run` gave is kept.
+    Kept {
+        /// That of the drive.
+        number: u8,
+        /// That of the content.
+        generation: u64,
     },
     /// A new session for the page.
     Join {},
     /// A message of the page, in the body.
     Say {},
-    /// Moves the world to this time. The body of the answer has what the page is sent meanwhile, a line for each message.
+    /// Moves the world to this time. The body of the answer has what the page is sent meanwhile, a line for each message; `stored` is
+    /// what drives have stored, for callers that keep it.
     Run {
         /// In ns since the world's zero.
         to_ns: u64,
@@ -70,6 +85,16 @@ enum Call {
     },
 }
 
+/// What a drive has stored, as text.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredText {
+    number: u8,
+    model: String,
+    /// Two hexadecimal digits for each byte.
+    image: String,
+}
+
 /// What has happened to a port, or to the page that has it.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -105,18 +130,25 @@ impl Library {
     pub fn call(&mut self, call: &[u8]) -> Vec<u8> {
         let end = call.iter().position(|byte| *byte == b'\n').unwrap_or(call.len());
         let body = call.get(end + 1..).unwrap_or_default();
-        let done = serde_json::from_slice(&call[..end]).map_err(|error| Failed::new("malformed", error.to_string()));
-        done.and_then(|call| self.carry_out(call, body))
+        read(&call[..end])
+            .map_err(|error| Failed::new("malformed", error.to_string()))
+            .and_then(|call| self.carry_out(call, body))
             .unwrap_or_else(|Failed { kind, message }| failed(kind, &message))
     }
 
     fn carry_out(&mut self, call: Call, body: &[u8]) -> Result<Vec<u8>, Failed> {
         match call {
-            Call::Open { unix_ms } => {
-                let world = HostedWorld::open(text(body)?, Duration::from_millis(unix_ms))?;
+            Call::Open { unix_ms, stored, keeps } => {
+                let stored: Vec<_> = stored.into_iter().map(Stored::from).collect();
+                let zero = Duration::from_millis(unix_ms);
+                let (world, unusable) = HostedWorld::open_with(text(body)?, zero, &stored, keeps)?;
                 let now = world.now();
                 (self.world, self.serial) = (Some(world), None);
-                Ok(answer(json!({ "now_ns": now.as_nanos() }), &[]))
+                Ok(answer(json!({ "now_ns": now.as_nanos(), "unusable": unusable }), &[]))
+            }
+            Call::Kept { number, generation } => {
+                self.world()?.confirm_store(number, generation);
+                Ok(answer(json!({}), &[]))
             }
             Call::Join {} => {
                 match &mut self.serial {
@@ -136,7 +168,8 @@ impl Library {
                 let world = self.world()?;
                 world.run_until(Instant::from_nanos(to_ns));
                 let (now, sent) = (world.now(), world.take_sent());
-                Ok(answer(json!({ "now_ns": now.as_nanos() }), sent.join("\n").as_bytes()))
+                let stored: Vec<_> = world.take_stores().iter().map(of_store).collect();
+                Ok(answer(json!({ "now_ns": now.as_nanos(), "stored": stored }), sent.join("\n").as_bytes()))
             }
             Call::Request(request) => {
                 let Response { status, kind, body } = match &self.serial {
@@ -201,6 +234,29 @@ impl Library {
     fn world(&mut self) -> Result<&mut HostedWorld, Failed> {
         self.world.as_mut().ok_or_else(|| Failed::new("no_world", "no world is open: open one first"))
     }
+}
+
+/// Serde has less code for `{"run":{..}}` than for a word among the fields.
+fn read(line: &[u8]) -> serde_json::Result<Call> {
+    let mut fields: Map<String, Value> = serde_json::from_slice(line)?;
+    let word = match fields.remove("call") {
+        Some(Value::String(word)) => word,
+        _ => return Err(serde::de::Error::missing_field("call")),
+    };
+    serde_json::from_value(Value::Object(Map::from_iter([(word, Value::Object(fields))])))
+}
+
+impl From<StoredText> for Stored {
+    fn from(StoredText { number, model, image }: StoredText) -> Self {
+        // What is not hexadecimal is shorter than an image, and refused as one.
+        let byte = |at| u8::from_str_radix(image.get(at..at + 2)?, 16).ok();
+        Self { number, model, image: (0..image.len()).step_by(2).map_while(byte).collect() }
+    }
+}
+
+fn of_store(StoredImage { number, model, generation, bytes }: &StoredImage) -> Value {
+    let image: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    json!({ "number": number, "model": model, "generation": generation, "image": image })
 }
 
 fn text(body: &[u8]) -> Result<&str, Failed> {

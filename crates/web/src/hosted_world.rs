@@ -12,6 +12,7 @@ use machine::file::Machine;
 use master::Network;
 use sim::World;
 use sim::command::{self, Service, perform};
+use sim::{StoredImage, VirtualDrive};
 use words::document::BadFile;
 use words::models::with_files;
 
@@ -51,6 +52,17 @@ impl From<BadFile> for Failed {
     }
 }
 
+/// What a drive has stored in a world before, as [`HostedWorld::take_stores`] gave it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stored {
+    /// The number of the drive.
+    pub number: u8,
+    /// Its model: another one cannot use it.
+    pub model: String,
+    /// The content of its non-volatile memory.
+    pub image: Vec<u8>,
+}
+
 /// It owns the world, the master on it, its host, and the conversation with the page.
 pub struct HostedWorld {
     world: World,
@@ -71,8 +83,30 @@ impl HostedWorld {
     /// # Errors
     /// What is wrong with the file, with the lines.
     pub fn open(machine: &str, unix_zero: Duration) -> Result<Self, Failed> {
+        Self::open_with(machine, unix_zero, &[], false).map(|(world, _)| world)
+    }
+
+    /// The same with what its drives have stored before; and why that of a drive cannot be used, which begins as it left the factory then.
+    /// With `is_kept` a drive acknowledges a store when [`confirm_store`](Self::confirm_store) has reported that its content is kept.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(
+        machine: &str,
+        unix_zero: Duration,
+        stored: &[Stored],
+        is_kept: bool,
+    ) -> Result<(Self, Vec<String>), Failed> {
         let machine = Machine::parse_in(machine, Path::new(""))?;
-        let mut world = machine.build()?;
+        let mut unusable = Vec::new();
+        let mut world = machine.build_with(&mut |number, drive| {
+            if let Err(why) = put_back(stored, number, drive) {
+                unusable.push(why);
+            }
+        })?;
+        if is_kept {
+            world.guard_stores();
+        }
         let network = Network::new();
         network.set_models(with_files(machine.models().map(|(_, model)| model)));
         let passed = PassedFrames::default();
@@ -101,7 +135,7 @@ impl HostedWorld {
         while hosted.is_searching() && hosted.now() < end {
             hosted.run_until(hosted.now() + STEP);
         }
-        Ok(hosted)
+        Ok((hosted, unusable))
     }
 
     /// Whether the host has still to find its drives.
@@ -164,6 +198,16 @@ impl HostedWorld {
         Ok(answer)
     }
 
+    /// What drives have stored since the last call, each once.
+    pub fn take_stores(&mut self) -> Vec<StoredImage> {
+        std::iter::from_fn(|| self.world.poll_store()).collect()
+    }
+
+    /// A content that [`take_stores`](Self::take_stores) gave is kept: the drive acknowledges its store.
+    pub fn confirm_store(&mut self, number: u8, generation: u64) {
+        self.world.confirm_store(number, generation);
+    }
+
     /// A hash of all that has happened: equal for equal runs, in every engine and natively.
     pub fn digest(&mut self) -> u64 {
         self.world.digest().value()
@@ -176,4 +220,14 @@ impl HostedWorld {
             self.world.refresh();
         }
     }
+}
+
+fn put_back(stored: &[Stored], number: u8, drive: &mut dyn VirtualDrive) -> Result<(), String> {
+    let Some(Stored { model, image, .. }) = stored.iter().find(|stored| stored.number == number) else { return Ok(()) };
+    let unusable =
+        |why: &str| format!("what drive {number} has stored cannot be used, and it begins as from the factory: {why}");
+    if model != drive.model() {
+        return Err(unusable(&format!("it is that of a {model}, and the drive is a {}", drive.model())));
+    }
+    drive.load_nvm(image).map_err(|refused| unusable(&refused.to_string()))
 }

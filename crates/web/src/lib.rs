@@ -23,6 +23,6 @@ mod requests;
 mod serial_host;
 
 pub use call::Library;
-pub use hosted_world::{Failed, HostedWorld};
+pub use hosted_world::{Failed, HostedWorld, Stored};
 pub use requests::{Request, Response};
 pub use serial_host::{LetGo, Line, SerialHost};

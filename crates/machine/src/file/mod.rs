@@ -23,8 +23,8 @@ use canopen::{Mux, NodeId};
 use master::identify::Identity;
 use master::parameters::{Parameters, from_any_state};
 use sim::Fidelity;
-use sim::World;
 use sim::machine::{Realism, TimingMode};
+use sim::{VirtualDrive, World};
 
 use bodies::Joined;
 pub use configuration::{mapped, pdo_id, sdo_server_record, tpdo_id};
@@ -263,6 +263,14 @@ impl Machine {
     /// # Errors
     /// What a drive does not take, with its place in the file.
     pub fn build(&self) -> Result<World, BadFile> {
+        self.build_with(&mut |_, _| {})
+    }
+
+    /// The same; each drive is handed out, by its number, before its power comes on: what it has stored can be put back into it.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_with(&self, prepare: &mut dyn FnMut(u8, &mut dyn VirtualDrive)) -> Result<World, BadFile> {
         self.check_realism()?;
         let mut world = self.world();
         let mut problems = Vec::new();
@@ -272,6 +280,7 @@ impl Machine {
             let mut drive =
                 sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
             let supplied = placed.supply(drive.as_mut());
+            prepare(spec.node.raw(), drive.as_mut());
             world.set_timing(self.timing_of(placed, TimingMode::Ideal));
             let added = world.add_drive(spec.node.raw(), drive);
             added.map_err(|error| placed.refused(None, &error.to_string()))?;

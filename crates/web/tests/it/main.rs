@@ -8,7 +8,7 @@ use std::time::Duration;
 use can::Instant;
 use scenario::{Runner, Scenario};
 use serde_json::{Value, json};
-use web::{HostedWorld, Library, Request};
+use web::{HostedWorld, Library, Request, Stored};
 
 const MACHINE: &str = include_str!("../../machine.toml");
 const WHEEL: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";
@@ -64,9 +64,12 @@ impl Page {
 
     /// The true speed of a shaft, in r/min.
     fn speed(&mut self, node: u8) -> f64 {
-        let got: Value =
-            serde_json::from_str(&self.world.command(&format!("{node} get")).expect("a drive")).expect("JSON");
-        got["velocity_rpm"].as_f64().expect("a speed")
+        self.around(node)["velocity_rpm"].as_f64().expect("a speed")
+    }
+
+    /// What is true of a drive.
+    fn around(&mut self, node: u8) -> Value {
+        serde_json::from_str(&self.world.command(&format!("{node} get")).expect("a drive")).expect("JSON")
     }
 
     fn get(&self, path: &str) -> (u16, Value) {
@@ -90,6 +93,61 @@ fn the_machine_that_a_page_begins_with_is_found_and_each_of_its_drives_moves() {
     for node in [1, 2, 4, 5] {
         let speed = page.speed(node);
         assert!((speed.abs() - 30.0).abs() < 3.0, "node {node} turns at {speed} r/min");
+    }
+    // The joint lifts what the file says, behind its motor; the stepper's table closes the switch at its end.
+    assert_eq!(page.around(1)["load_torque_nm"], 0.3);
+    assert!(page.around(1)["current_a"].as_f64().is_some_and(|current| current > 0.05), "{}", page.around(1));
+    assert_eq!(page.around(2)["inputs"]["X1"], 0);
+    for _ in 0..100 {
+        page.run(100);
+        page.say(json!({ "do": "alive" }));
+    }
+    let stepper = page.around(2);
+    assert_eq!((&stepper["inputs"]["X0"], &stepper["inputs"]["X1"]), (&json!(0), &json!(1)), "{stepper}");
+    assert!(stepper["position"].as_i64().is_some_and(|counts| counts >= 8000), "{stepper}");
+}
+
+/// What a drive stores is handed out before the drive acknowledges it, and is there in the next world.
+#[test]
+fn what_a_drive_has_stored_is_there_when_it_is_put_back() {
+    let read = json!({ "do": "read_objects", "node": 4, "objects": ["2013:01"] });
+    let open = |stored: &[Stored], is_kept| {
+        HostedWorld::open_with(WHEEL, Duration::ZERO, stored, is_kept).map(|(world, why)| (Page { world, seq: 0 }, why))
+    };
+    let (mut page, _) = open(&[], true).expect("a machine");
+    let factory = page.must(read.clone())["result"]["values"].clone();
+    page.must(json!({ "do": "take_control" }));
+    assert_eq!(page.world.take_stores(), []);
+    // The drive stores this object with the write: the answer to that waits.
+    let write = json!({ "do": "write_parameters", "node": 4, "values": [{ "object": "2013:01", "value": "850" }] });
+    let seq = page.say(write);
+    let answer = |page: &mut Page| {
+        page.run(100);
+        let sent = page.world.take_sent();
+        sent.iter().map(|line| serde_json::from_str::<Value>(line).expect("JSON")).find(|message| message["seq"] == seq)
+    };
+    assert_eq!(answer(&mut page), None, "it is not kept yet");
+    let images = page.world.take_stores();
+    let [image] = &images[..] else { panic!("one store, got {images:?}") };
+    page.world.confirm_store(image.number, image.generation);
+    assert_eq!(answer(&mut page).expect("an answer")["ok"], true);
+    let changed = page.must(read.clone())["result"]["values"].clone();
+    assert_ne!(changed, factory);
+    let stored = Stored { number: image.number, model: image.model.to_owned(), image: image.bytes.clone() };
+    let (mut again, unusable) = open(std::slice::from_ref(&stored), true).expect("a machine");
+    assert_eq!((again.must(read.clone())["result"]["values"].clone(), unusable), (changed, vec![]));
+    assert_eq!(again.world.take_stores(), [], "what was put back is kept");
+    for bad in [
+        Stored { model: "zlim42c".into(), ..stored.clone() },
+        Stored { image: vec![1], ..stored.clone() },
+        Stored { image: vec![], ..stored },
+    ] {
+        let (mut page, unusable) = open(&[bad], true).expect("a machine");
+        assert!(
+            unusable.len() == 1 && unusable[0].starts_with("what drive 4 has stored cannot be used"),
+            "{unusable:?}"
+        );
+        assert_eq!(page.must(read.clone())["result"]["values"], factory);
     }
 }
 

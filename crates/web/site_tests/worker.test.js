@@ -1,0 +1,44 @@
+// The worker of a page, in node, with a clock that the test has.
+
+import assert from "node:assert/strict";
+import { join } from "node:path";
+import { test } from "node:test";
+import { pathToFileURL } from "node:url";
+
+const WHEEL = '[[drive]]\nmodel = "zlac8030l"\nnode = 4\n';
+
+test("time that a worker was away for is left out, and said at most once a second", async () => {
+  let [now, hand, tick] = [1000, null, null];
+  const posted = [];
+  const [clock, timer] = [performance.now, setInterval];
+  Object.assign(globalThis, { postMessage: (message) => posted.push(message), addEventListener: (_, handle) => (hand = handle), close: () => {} });
+  try {
+    performance.now = () => now;
+    globalThis.setInterval = (handle) => (tick = handle);
+    await import(pathToFileURL(join(process.env.SITE, "worker.js")));
+    hand({ data: { open: true, machine: WHEEL, files: {}, stored: [] } });
+    while (tick === null) await new Promise((resolve) => setImmediate(resolve));
+    const said = () => posted.filter(({ event }) => event === "skipped").map(({ detail }) => detail);
+    const time = () => JSON.parse(posted.findLast(({ text }) => text?.includes('"type":"state"')).text).time_s;
+    const pass = (ms) => {
+      now += ms;
+      tick();
+    };
+    for (let count = 0; count < 100; count += 1) pass(5);
+    assert.deepEqual(said(), [], "it keeps up");
+    const before = time();
+    // 20 s of sleep, of which 20 ms are caught up with.
+    pass(20_000);
+    assert.deepEqual(said(), [19_980]);
+    pass(300);
+    for (let count = 0; count < 100; count += 1) pass(5);
+    assert.deepEqual(said(), [19_980], "not again within a second");
+    for (let count = 0; count < 200; count += 1) pass(5);
+    assert.equal(said().length, 2);
+    assert.ok(said()[1] > 250 && said()[1] < 300, said().join());
+    assert.ok(time() - before < 2, `${time() - before} s of the drives have passed`);
+  } finally {
+    performance.now = clock;
+    globalThis.setInterval = timer;
+  }
+});
