@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::command::configure::{dcf, init, lss, params, program, store, tune};
 use crate::command::look::{dump, emcy, objects, pdo, read, report, studio, top, watch};
 use crate::command::moving::{drive_base, group, test_motion};
-use crate::command::network::{boot, check, conform, gateway, latency, nmt, plan, send, supervise, sync, time};
+use crate::command::network::{boot, check, conform, gateway, latency, plan, send, supervise, sync, time};
 use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};
 use crate::command::simulate::{demo, events, run, sim, world};
 use crate::command::tools::{completions, eds, export, fmu, man_pages, readings};
@@ -44,7 +44,6 @@ pub(crate) enum Command {
     Plan(plan::Plan),
     Check(check::Check),
     Emcy(emcy::Emcy),
-    Nmt(nmt::Nmt),
     Lss(lss::Lss),
     Sync(sync::SyncCommand),
     Time(time::Time),
@@ -70,7 +69,6 @@ pub(crate) enum Command {
     Decode(decode::Decode),
     Convert(convert::Convert),
     Replay(replay::Replay),
-    Save(store::Save),
     Restore(store::Restore),
     Program(program::Program),
     Completions(completions::Completions),

@@ -274,11 +274,9 @@ fn run(global: &Global, format: Format, command: &Command, typed: Typed) -> Resu
         Command::Time(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Send(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Lss(command) => on_bus(global, format, async |context| command.run(context).await),
-        Command::Nmt(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Report(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Conform(command) => command.run(global, format),
         Command::OfConsole(command) => of_console(global, format, command),
-        Command::Save(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Restore(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Program(command) => on_bus(global, format, async |context| command.run(context).await),
         Command::Tune(command) => {

@@ -7,8 +7,9 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser};
-use host::command::{NewValue, ParameterChange};
+use host::command::{NewValue, ParameterChange, PdoCommand};
 use host::console::{Hands, Order, Said, Work};
 use host::{Command as Asked, NodeCommand};
 use master::explain::Overheard;
@@ -55,7 +56,12 @@ impl host::console::Reader for Reader {
         let words = words_of(line).map_err(Said::senseless)?;
         // As a line is copied from the manual.
         let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
-        let matches = parser().try_get_matches_from(words).map_err(|error| said(&error))?;
+        let matches = parser().try_get_matches_from(words).map_err(|error| match words.first() {
+            Some(word) if error.kind() == ErrorKind::InvalidSubcommand => {
+                elsewhere(word).unwrap_or_else(|| said(&error))
+            }
+            _ => said(&error),
+        })?;
         let CommandLine { command } = CommandLine::from_arg_matches(&matches).map_err(|error| said(&error))?;
         let effect = match &command {
             LineCommand::Read(_) => Effect::None,
@@ -70,6 +76,12 @@ impl host::console::Reader for Reader {
                 let values = vec![NewValue { object, value }];
                 let write = ParameterChange::WriteParameters { values, file: None };
                 Some(NodeCommand::Change(write).to(node))
+            }
+            Effect::Stores(node) => Some(NodeCommand::Change(ParameterChange::Store {}).to(node)),
+            Effect::Manages(node, command) => Some(NodeCommand::Pdos(PdoCommand::Nmt { command }).to(node)),
+            Effect::ManagesMore => {
+                let text = "error: a page resets and stops no node by NMT, and commands no two at once\n  next:    nmt NODE start, or nmt NODE pre-operational; the program does the others";
+                return Err(Said::senseless(text.to_owned()));
             }
             Effect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
             Effect::StopAll => Some(Asked::STOP_ALL),
@@ -92,6 +104,62 @@ fn check(command: &Command) -> Result<(), Said> {
         return Err(Said::senseless(text.to_owned()));
     }
     command.guard().map_or(Ok(()), GuardArgs::check_for_host).map_err(|failure| Said::failed(&failure))
+}
+
+/// Commands of the program that a line does not have, and the view of a page that does what they do; none where only a shell does.
+const ELSEWHERE: &[(&str, &[&str])] = &[
+    ("Drive", &["report"]),
+    ("Faults", &["emcy"]),
+    ("Motion", &["drive-base", "group"]),
+    ("PDO", &["pdo"]),
+    ("Parameters", &["dcf", "objects", "params"]),
+    ("Scope", &["capture", "record", "test-motion", "tune", "watch"]),
+    ("Trace", &["dump", "send"]),
+    ("World", &["events", "world"]),
+    (
+        "",
+        &[
+            "boot",
+            "check",
+            "completions",
+            "conform",
+            "convert",
+            "decode",
+            "demo",
+            "eds",
+            "export",
+            "fmu",
+            "gateway",
+            "init",
+            "latency",
+            "lss",
+            "man-pages",
+            "options",
+            "plan",
+            "plot",
+            "program",
+            "readings",
+            "replay",
+            "restore",
+            "run",
+            "sim",
+            "studio",
+            "supervise",
+            "sync",
+            "time",
+            "top",
+        ],
+    ),
+];
+
+/// What is said of a command that the program has and a line has not.
+fn elsewhere(word: &str) -> Option<Said> {
+    let (view, _) = ELSEWHERE.iter().find(|(_, words)| words.contains(&word))?;
+    let next = match *view {
+        "" => format!("ferrodrive {word}, in a shell"),
+        view => format!("the {view} view does that here; ferrodrive {word}, in a shell"),
+    };
+    Some(Said::senseless(format!("error: the console of a page has no command '{word}'\n  next:    {next}")))
 }
 
 /// Options that a line does not have.

@@ -46,7 +46,6 @@ pub(crate) mod network {
     pub(crate) mod conform;
     pub(crate) mod gateway;
     pub(crate) mod latency;
-    pub(crate) mod nmt;
     pub(crate) mod plan;
     pub(crate) mod send;
     pub(crate) mod supervise;

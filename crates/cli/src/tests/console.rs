@@ -167,6 +167,9 @@ fn a_line_says_in_a_page_what_it_says_in_a_shell() {
         "read 9 6041",
         "write 4 6083 600ms",
         "write 2 profile_acceleration 0x258",
+        "save 4",
+        "nmt 4 pre-operational",
+        "nmt 4 start --wait 2s",
     ] {
         // As long as a page waits.
         let words: Vec<_> = ["--bus", &bus, "--timeout", "200ms"].into_iter().chain(line.split(' ')).collect();
@@ -191,6 +194,8 @@ fn a_line_that_makes_no_sense_is_refused_in_the_words_of_the_command_line() {
         "stop",
         "home 4",
         "move 4 90deg --speed 5",
+        "save",
+        "nmt 4 fly",
     ] {
         let shell = without_bus(&line.split(' ').collect::<Vec<_>>());
         let (text, status) = page.line(line);
@@ -210,7 +215,16 @@ fn a_line_that_makes_no_sense_is_refused_in_the_words_of_the_command_line() {
 fn a_line_moves_a_drive_for_the_session_in_control_alone_and_within_its_speed_limit() {
     let mut page = Page::new();
     page.must(json!({ "do": "release_control" }));
-    for line in ["move 4 90deg", "velocity 4 60rpm", "enable 4", "stop 4", "reset 4", "write 4 6083 600"] {
+    for line in [
+        "move 4 90deg",
+        "velocity 4 60rpm",
+        "enable 4",
+        "stop 4",
+        "reset 4",
+        "write 4 6083 600",
+        "save 4",
+        "nmt 4 start",
+    ] {
         let (text, status) = page.line(line);
         assert!(status == 1 && text.contains("take control first"), "{line}: {text}");
     }
@@ -429,4 +443,41 @@ fn what_nothing_would_stop_is_moved_only_after_that_was_accepted() {
     page.must(json!({ "do": "accept_unguarded", "node": 2 }));
     let (text, status) = page.line("move 2 90deg");
     assert!(status == 0 && text.contains("note: node 2: if this command dies, nothing stops it"), "{text}");
+}
+
+/// What only the program can do is said to be there, with the view that does it in a page: a word is known or it is not.
+#[test]
+fn a_line_knows_every_command_of_the_program() {
+    let mut page = Page::new();
+    for command in crate::scope::command_line().get_subcommands() {
+        let name = command.get_name();
+        let (text, status) = page.line(&format!("{name} --help"));
+        let is_elsewhere =
+            status == 2 && text.starts_with(&format!("error: the console of a page has no command '{name}'"));
+        assert!(status == 0 || is_elsewhere, "{name}: {status} {text}");
+    }
+    let (text, _) = page.line("params backup 4");
+    assert!(text.contains("the Parameters view does that here; ferrodrive params, in a shell"), "{text}");
+}
+
+#[test]
+fn a_line_stores_and_resets_no_node() {
+    let mut page = Page::new();
+    assert_eq!(page.line("write 2 1017 500").1, 0);
+    let written = page.line("read 2 1017").0;
+    assert_eq!(page.line("save 2").1, 0);
+    page.world.command("2 power cycle").expect("a world");
+    page.silent(3000);
+    assert_eq!(page.line("read 2 1017").0, written);
+    let has =
+        |page: &mut Page, nmt: &str| page.line("state 4").0.lines().any(|line| line == format!("  nmt         {nmt}"));
+    assert_eq!(page.line("nmt 4 pre-operational").1, 0);
+    page.silent(1500);
+    assert!(has(&mut page, "pre-operational"));
+    for line in ["nmt all start", "nmt 4 reset", "nmt 4 stop", "nmt 4 reset-communication"] {
+        let (text, status) = page.line(line);
+        assert!(status == 2 && text.contains("nmt NODE pre-operational"), "{line}: {text}");
+    }
+    page.silent(1500);
+    assert!(has(&mut page, "pre-operational"));
 }

@@ -6,9 +6,11 @@ pub mod estop;
 pub mod explain;
 pub mod home;
 pub mod motion;
+pub mod nmt;
 pub mod object;
 pub mod read;
 pub mod scan;
+pub mod store;
 pub mod write;
 
 use clap::Subcommand;
@@ -57,6 +59,10 @@ pub enum Command {
     Torque(motion::Torque),
     #[allow(missing_docs, reason = "as above")]
     Home(home::Home),
+    #[allow(missing_docs, reason = "as above")]
+    Save(store::Save),
+    #[allow(missing_docs, reason = "as above")]
+    Nmt(nmt::Nmt),
 }
 
 /// What came of one of them.
@@ -75,6 +81,10 @@ pub enum Outcome {
     Stopped(StopOutcome),
     /// Of a motion.
     Moved(Box<MotionOutcome>),
+    /// Parameters that a drive has stored.
+    Stored(Box<store::StoreReport>),
+    /// An NMT command.
+    Managed(Box<nmt::NmtReport>),
 }
 
 impl Command {
@@ -98,6 +108,8 @@ impl Command {
             Self::Move(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Torque(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Home(command) => Outcome::Moved(Box::new(command.run(context).await?)),
+            Self::Save(command) => Outcome::Stored(Box::new(command.run(context).await?)),
+            Self::Nmt(command) => Outcome::Managed(Box::new(command.run(context).await?)),
         })
     }
 
@@ -129,6 +141,8 @@ impl Command {
             Self::Move(command) => moves((command.node, command.motion())),
             Self::Torque(command) => moves((command.node, command.motion())),
             Self::Home(command) => moves((command.node, command.motion())),
+            Self::Save(command) => Effect::Stores(command.node),
+            Self::Nmt(command) => command.change().map_or(Effect::ManagesMore, |(node, to)| Effect::Manages(node, to)),
         }
     }
 }
@@ -146,7 +160,12 @@ impl Outcome {
         match self {
             Self::Stopped(outcome) => outcome.failure(),
             Self::Explained(explanation) => explanation.failure(),
-            Self::Scanned(_) | Self::Written(_) | Self::State(_) | Self::Moved(_) => None,
+            Self::Scanned(_)
+            | Self::Written(_)
+            | Self::State(_)
+            | Self::Moved(_)
+            | Self::Stored(_)
+            | Self::Managed(_) => None,
         }
     }
 }
@@ -161,6 +180,8 @@ impl Outcome {
             Self::Explained(report) => explain::text(report, paint),
             Self::Stopped(report) => report.text(paint),
             Self::Moved(report) => report.text(paint),
+            Self::Stored(report) => report.text(paint),
+            Self::Managed(report) => report.text(paint),
         }
     }
 }

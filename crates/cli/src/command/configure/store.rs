@@ -1,29 +1,13 @@
-//! `ferrodrive save` and `restore`: a drive's own parameter memory, by its model's own commands.
+//! `ferrodrive restore`: a drive's own parameter memory, by its model's own command. `save` is a command of consoles too.
 
 use canopen::NodeId;
-use devices::{ParameterStorage, Write};
-use master::{Drive, Error};
-use serde::Serialize;
+use console::command::store::StoreReport;
 
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
 use plot::Paint;
 use words::node::node;
-
-/// Store a drive's parameters in its own memory
-///
-/// Shows which object the model has for it, and which values take effect only after the next start. What a model stores
-/// without being asked is on its page of the handbook.
-#[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive --bus can0 save 4\n  ferrodrive --bus can0 params backup 4 -o wheel.toml    # a copy in a file"
-)]
-pub(crate) struct Save {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    node: NodeId,
-}
 
 /// Restore a drive's parameters to their factory values
 ///
@@ -38,31 +22,6 @@ pub(crate) struct Restore {
     node: NodeId,
 }
 
-/// What was done.
-#[derive(Debug, Serialize)]
-pub(crate) struct StoreReport {
-    node: u8,
-    done: &'static str,
-    object: String,
-    effective_after_restart: Vec<Named>,
-}
-
-/// An object by number and name.
-#[derive(Debug, Serialize)]
-struct Named {
-    object: String,
-    name: Option<&'static str>,
-}
-
-impl Save {
-    /// Stores.
-    pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
-        let drive = context.drive_without_note(self.node).await?;
-        drive.save().await?;
-        StoreReport::new(&drive, "stored", |storage| storage.save)
-    }
-}
-
 impl Restore {
     /// Restores.
     pub(crate) async fn run(&self, context: &Context) -> Result<StoreReport, Failure> {
@@ -72,36 +31,8 @@ impl Restore {
     }
 }
 
-impl StoreReport {
-    fn new(
-        drive: &Drive,
-        done: &'static str,
-        write: impl Fn(&ParameterStorage) -> Option<Write>,
-    ) -> Result<Self, Failure> {
-        let (node, intent) = (drive.node().id(), "show what was stored");
-        let model = drive.description().ok_or(Error::UnknownModel { node, intent })?;
-        let after_restart = model.storage.effective_after_restart.iter();
-        let after_restart =
-            after_restart.map(|mux| Named { object: mux.to_string(), name: model.row(*mux).map(|row| row.name) });
-        let intent = "name the object";
-        let object = write(&model.storage).or(model.storage.save).ok_or(Error::UnknownModel { node, intent })?.object;
-        Ok(Self {
-            node: node.raw(),
-            done,
-            object: object.to_string(),
-            effective_after_restart: after_restart.collect(),
-        })
-    }
-}
-
 impl Report for StoreReport {
-    fn text(&self, _: Paint) -> String {
-        let named = |row: &Named| format!("{} {}", row.object, row.name.unwrap_or_default()).trim_end().to_owned();
-        let objects: Vec<String> = self.effective_after_restart.iter().map(named).collect();
-        let after = match objects.as_slice() {
-            [] => String::new(),
-            objects => format!("\n  after a restart only: {}", objects.join(", ")),
-        };
-        format!("node {}: parameters {} (through {}){after}", self.node, self.done, self.object)
+    fn text(&self, paint: Paint) -> String {
+        Self::text(self, paint)
     }
 }

@@ -4,27 +4,27 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::object::PRODUCER_HEARTBEAT_TIME;
-use canopen::{NmtCommand, NmtState};
+use canopen::{NmtCommand, NmtState, NodeId};
 use clap::ValueEnum;
+use host::command::NmtChange;
 use master::units::parse_duration;
 use master::{Elapsed, Node, NodeView};
+use plot::Paint;
 use serde::Serialize;
+use words::node::{Nodes, nodes};
 
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
-use plot::Paint;
-use words::node::{Nodes, nodes};
 
 /// Send a network management command to one node or to all
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus socketcand://HOST:29536/can0 nmt 4 start\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 nmt all pre-operational\n  ferrodrive nmt 1 start --wait\n  \
     ferrodrive --bus slcan:///dev/ttyACM0 nmt all reset --wait 3s")]
-pub(crate) struct Nmt {
+pub struct Nmt {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
-    nodes: Nodes,
+    pub(super) nodes: Nodes,
     /// Command to send
     command: NmtWord,
     /// Wait until the node confirms it: by its heartbeat, after a reset by its boot-up message
@@ -55,7 +55,7 @@ const BOOT_PATIENCE: Duration = Duration::from_secs(5);
 
 /// What was done.
 #[derive(Debug, Serialize)]
-pub(crate) struct NmtReport {
+pub struct NmtReport {
     node: Option<u8>,
     command: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -78,8 +78,20 @@ struct NmtAnswer {
 }
 
 impl Nmt {
-    /// Sends the command; after a reset of one node waits for its boot-up message.
-    pub(crate) async fn run(&self, context: &Context) -> Result<NmtReport, Failure> {
+    /// What a host does of it, for a page: to one node, and not what resets it.
+    pub(super) fn change(&self) -> Option<(NodeId, NmtChange)> {
+        match (self.nodes, self.command) {
+            (Nodes::One(node), NmtWord::Start) => Some((node, NmtChange::Start)),
+            (Nodes::One(node), NmtWord::PreOperational) => Some((node, NmtChange::PreOperational)),
+            _ => None,
+        }
+    }
+
+    /// Sends the command, which the host of a page has done before; after a reset of one node waits for its boot-up message.
+    ///
+    /// # Errors
+    /// What was waited for has not come.
+    pub async fn run(&self, context: &Context) -> Result<NmtReport, Failure> {
         let command = self.command.command();
         let done = NmtReport { node: None, command: command.word(), booted: None, state: None, nodes: None };
         let Nodes::One(node) = self.nodes else {
@@ -97,7 +109,9 @@ impl Nmt {
         let resets = matches!(command, NmtCommand::ResetNode | NmtCommand::ResetCommunication);
         let booted = handle.wait_boot_up(self.wait.unwrap_or(BOOT_PATIENCE));
         let before = context.network.now();
-        handle.nmt(command);
+        if context.in_control().is_none() {
+            handle.nmt(command);
+        }
         let mut state = None;
         if resets {
             booted.await?;
@@ -131,7 +145,7 @@ impl Nmt {
             let state = model.map_or(reported, |model| model.nmt_state(reported));
             Some((heard, state)).filter(|(_, state)| *state == wanted)
         };
-        context.progress.show(format!("node {id}: waiting until it reports that it is {wanted}"));
+        context.show(format!("node {id}: waiting until it reports that it is {wanted}"));
         match handle.wait(said, patience).await {
             Ok((_, state)) => Ok(state),
             Err(Elapsed) => Err(self.not_reached(context, handle, wanted, before, patience).await),
@@ -166,7 +180,7 @@ impl Nmt {
                 .next(format!("ferrodrive write {id} 1017 100, then once more; or omit --wait")),
             Ok(ms) => failure
                 .because(format!("no heartbeat came, though 1017h is {ms} ms"))
-                .next(format!("ferrodrive --bus {} dump --node {id}, or a longer --wait", context.bus())),
+                .next(format!("ferrodrive --bus {} dump --node {id}, or a longer --wait", context.bus_name)),
             Err(error) => failure
                 .because(format!("no heartbeat came, and {error}"))
                 .next("ferrodrive scan shows the nodes on the bus"),
@@ -177,7 +191,7 @@ impl Nmt {
 /// What every node says within a time.
 async fn said_by_all(context: &Context, patience: Duration) -> Vec<NmtAnswer> {
     let before = context.network.now();
-    context.progress.show("listening to the nodes");
+    context.show("listening to the nodes");
     context.network.sleep(patience).await;
     let said = context.network.seen().iter().filter_map(|node| {
         let facts = context.network.facts(node);
@@ -202,8 +216,9 @@ impl NmtWord {
     }
 }
 
-impl Report for NmtReport {
-    fn text(&self, _: Paint) -> String {
+impl NmtReport {
+    /// As lines for people.
+    pub fn text(&self, _: Paint) -> String {
         let whom = self.node.map_or_else(|| "all nodes".into(), |node| format!("node {node}"));
         let booted = if self.booted == Some(true) { "; it has booted" } else { "" };
         let state = self.state.as_ref().map(|state| format!("; it is {state}")).unwrap_or_default();
