@@ -9,8 +9,6 @@ mod bench;
 mod bench_peers;
 mod browser;
 mod builder;
-#[path = "../../crates/studio/src/web/bundle.rs"]
-mod bundle;
 mod conform_peers;
 mod cross;
 mod debian;

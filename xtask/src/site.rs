@@ -8,11 +8,15 @@ use std::process::Command;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use crate::bundle::{Module, bundles};
 use crate::dist::{copy, write};
 use crate::process::{output, quietly, works};
 use crate::say::say;
 use crate::{wasm_order, workspace};
+use bundle::{Module, bundles};
+
+/// What the studio bundles its own page with.
+#[path = "../../crates/studio/src/web/bundle.rs"]
+mod bundle;
 
 /// Nothing is fetched from anywhere but the page's own host, and nothing in the page is a script but its files. A worker compiles the module; it
 /// has the policy of its own answer, so that this has to hold as a header of every file too.

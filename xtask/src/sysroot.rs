@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
-use crate::debian::{apt, last_line};
 use crate::builder;
+use crate::debian::{apt, last_line};
 use crate::process::{self, output, quietly};
 use crate::say::say;
 use crate::workspace;

@@ -50,7 +50,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "words",
         ],
     ),
-    ("console", &["canopen", "cia402", "devices", "host", "master", "plot", "words"]),
+    ("console", &["can", "canopen", "cia402", "devices", "host", "master", "plot", "words"]),
     ("serve", &["can", "canlog", "foxglove", "host", "master", "recording", "scenario", "sim", "transport", "words"]),
     ("studio", &["can", "canlog", "canopen", "host", "machine", "master", "recording", "words"]),
     ("web", &["can", "canopen", "console", "host", "machine", "master", "scenario", "sim", "slcan", "words"]),

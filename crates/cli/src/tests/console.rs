@@ -392,7 +392,7 @@ fn an_estop_of_a_session_without_control_stops_and_does_no_more() {
     let mut page = Page::new();
     page.must(json!({ "do": "release_control" }));
     let (text, status) = page.line("estop");
-    assert!(status == 0 && text.contains("node 4 (zlac8030l): stands"), "{text}");
+    assert!(status == 0 && text.contains("node 4 (zlac8030l): at standstill"), "{text}");
     assert!(text.contains("the NMT states of the nodes stay as they are"), "{text}");
     let has =
         |page: &mut Page, nmt: &str| page.line("state 1").0.lines().any(|line| line == format!("  nmt         {nmt}"));

@@ -52,7 +52,7 @@ fn the_frames_of_a_cycle_have_the_times_that_are_counted_by_hand() {
         assert!(same["worst_us"].as_f64().unwrap() >= row["worst_us"].as_f64().unwrap(), "{row} {same}");
     }
     let text = done(&["plan", file, "--cycle", "5ms", "--mode", "pv"]).out;
-    assert!(text.contains("no frame is late") && text.contains("here are 2"), "{text}");
+    assert!(text.contains("no frame is late") && text.contains("; 2 are planned"), "{text}");
 }
 
 #[test]

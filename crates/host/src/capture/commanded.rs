@@ -17,7 +17,7 @@ use words::failure::Failure;
 
 use super::measurand::{Measurand, TRUE, Way};
 use super::quantity::had;
-use super::run::{CaptureOutcome, CaptureRun};
+use super::run::{CaptureOutcome, CaptureRun, NamedCapture};
 use super::{Captured, Running, SeenBy, Span, Taken, Wanted, WayBack, not_put_back, with_left};
 use crate::command::{CaptureCommand, CaptureOrder};
 use crate::motion::guarding::UNGUARDED;
@@ -26,7 +26,6 @@ use crate::network::report::{self, Made, NodeReport};
 use crate::parameters::transactions::Refusal;
 use crate::parameters::{STORING, answer, busy, refuse};
 use crate::state::Host;
-use crate::test_motion::Followed;
 use crate::work::{Asked, Done};
 
 /// Readings of one capture that a page is sent at most: some megabytes as JSON.
@@ -273,7 +272,7 @@ fn outcome_of(
     captured: Result<(Running, Taken), Failure>,
     left: &[String],
     nmt_back: Option<SeenBy>,
-) -> Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal> {
+) -> Result<(Vec<NamedCapture>, Value), Refusal> {
     let (running, taken) = captured.map_err(|failure| refusal(&with_left(failure, left)))?;
     let Taken { capture, cut_off, first_at } = taken;
     if capture.time_s.is_empty() {

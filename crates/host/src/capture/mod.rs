@@ -23,6 +23,6 @@ pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, SeenBy, not_put_back, with_left};
 pub use rows::Trigger;
-pub(crate) use run::{CaptureOutcome, CaptureRun};
+pub(crate) use run::{CaptureOutcome, CaptureRun, NamedCapture};
 pub use session::{Running, Span, Taken, Wanted};
 pub use ways_back::{WayBack, WaysBack};

@@ -18,11 +18,14 @@ pub(crate) struct CaptureRun {
     pub(crate) abort: AbortHandle,
 }
 
+/// A capture, its name in the report of the node, and how its points were followed.
+pub(crate) type NamedCapture = (String, Capture, Option<Followed>);
+
 /// What came of a capture.
 pub(crate) struct CaptureOutcome {
     pub(crate) node: NodeId,
     /// The number of the motion, where it was one.
     pub(crate) generation: Option<u64>,
-    /// Captures with their names in the report of the node, how points were followed, and the answer.
-    pub(crate) outcome: Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal>,
+    /// Captures for the report of the node, and the answer.
+    pub(crate) outcome: Result<(Vec<NamedCapture>, Value), Refusal>,
 }

@@ -7,12 +7,11 @@ use canopen::NodeId;
 use futures_util::future::{AbortHandle, AbortRegistration, Abortable};
 use master::Drive;
 use master::cyclic::CyclicOptions;
-use recording::Capture;
 use serde_json::{Value, json};
 
-use super::{Followed, Motion, Order, Run, ShapeName, run, usual_quantities};
+use super::{Motion, Order, Run, ShapeName, run, usual_quantities};
 use crate::capture::commanded::{check_size, measurands, refusal, shown};
-use crate::capture::{CaptureOutcome, CaptureRun, Restorer, Wanted, WayBack, not_put_back, with_left};
+use crate::capture::{CaptureOutcome, CaptureRun, NamedCapture, Restorer, Wanted, WayBack, not_put_back, with_left};
 use crate::command::TestMotionOrder;
 use crate::motion::guarding::{expect_guard, guard};
 use crate::parameters::transactions::Refusal;
@@ -173,7 +172,7 @@ fn outcome_of(
     moved: Result<(), Refusal>,
     runs: Vec<Run>,
     (restorer, left): (&Restorer, &[String]),
-) -> Result<(Vec<(String, Capture, Option<Followed>)>, Value), Refusal> {
+) -> Result<(Vec<NamedCapture>, Value), Refusal> {
     let not_back = not_put_back(node, left).map(|failure| refusal(&with_left(failure, left)));
     // Of what was seen of no run there is the failure alone.
     if runs.is_empty() {

@@ -129,7 +129,7 @@ fn an_invalid_line_is_refused_with_what_was_expected_and_changes_nothing() {
             ("quit", "usage", "changes nothing in the world"),
             ("run 5s", "usage", "changes nothing in the world"),
             ("4 get", "usage", "changes nothing in the world"),
-            ("9 cable cut", "no_such_node", "there is 4, 2"),
+            ("9 cable cut", "no_such_node", "running: 4, 2"),
             ("4 input X9 1", "refused", "X9"),
             ("4 supply 1000000", "refused", "supply"),
         ] {

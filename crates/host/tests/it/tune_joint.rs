@@ -1,4 +1,5 @@
 //! A joint is identified by what is read of it and by its twin: held to what its plant has, and so are the gains proposed.
+#![allow(clippy::print_stdout, reason = "docs/fidelity.md has these figures")]
 
 use std::time::Duration;
 

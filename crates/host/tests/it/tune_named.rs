@@ -1,4 +1,5 @@
 //! A servo whose maker's objects for its gains a machine file names: found out as a wheel is, with the same bounds.
+#![allow(clippy::print_stdout, reason = "docs/fidelity.md has these figures")]
 
 use std::path::PathBuf;
 use std::time::Duration;

@@ -1,5 +1,6 @@
 //! Fifty wheels with loads of any kind: what is identified of each is held to what its plant has, over a bus as a program has it, and the
 //! gains proposed are tried on that plant. The default is a few of them; `docs/fidelity.md` has the table of all.
+#![allow(clippy::print_stdout, reason = "docs/fidelity.md has these figures")]
 
 use std::f64::consts::TAU;
 use std::fmt;

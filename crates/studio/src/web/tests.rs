@@ -287,7 +287,6 @@ async fn half_a_header_has_five_seconds() {
     assert!(ended.is_ok() && rest.is_empty(), "it did not come: {ended:?}");
 }
 
-/// As the command line reads them.
 #[tokio::test]
 async fn the_trace_is_saved_with_the_same_frames_in_each_form() {
     let (app, access, inbox) = server(None);

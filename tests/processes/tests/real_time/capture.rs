@@ -1,5 +1,6 @@
 //! `ferrodrive capture` over a socket in the time of the clock: what was had, and a kill (kill -9) while it captures. What is not put back
 //! by a program that dies is put back by the next, from the journal.
+#![allow(clippy::print_stdout, reason = "how late a busy machine is can be shown and not judged")]
 #![cfg(unix)]
 
 use std::path::Path;

@@ -29,7 +29,7 @@ const LARGEST_TUNING: u64 = 16 << 20;
 /// it, and it is not moved.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive report 4 -o wheel.html --by 'A. Fitter'\n  \
-    ferrodrive --bus can0 report 4 -o wheel.html --capture run.mcap --tune tune.json")]
+    ferrodrive --bus can0 report 4 -o w.html --capture run.mcap --tune tune.json")]
 pub(crate) struct Report {
     /// Node-ID
     #[arg(value_parser = node)]

@@ -123,6 +123,9 @@ struct RunRow {
     capture: CaptureRow,
 }
 
+/// Times and angles of a path, and what is to be known of it.
+type RecordedPath = (Vec<(f64, f64)>, Vec<String>);
+
 impl TestMotion {
     /// Moves, captures, and reports each run.
     pub(crate) async fn run(&self, context: &Context) -> Result<TestMotionReport, Failure> {
@@ -192,7 +195,7 @@ impl TestMotion {
     }
 
     /// The position of a capture, in degrees, and whether it is of another drive: its way is that of an output all the same.
-    fn recorded(&self, drive: &Drive) -> Result<(Vec<(f64, f64)>, Vec<String>), Failure> {
+    fn recorded(&self, drive: &Drive) -> Result<RecordedPath, Failure> {
         let path = self
             .path
             .as_deref()
