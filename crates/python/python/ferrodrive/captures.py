@@ -42,7 +42,7 @@ def save_capture(capture: Capture, path: File) -> None:
     :raises MasterError: the name has another ending
     :raises OSError: the file cannot be written, or belongs to others
 
-    >>> capture = drive.capture("velocity", duration=0.05)
+    >>> capture = drive.capture("velocity", duration=0.05, period=0.002)
     >>> ferrodrive.save_capture({**capture, "notes": "cold"}, "step.csv")
     >>> ferrodrive.load_capture("step.csv")["notes"]
     'cold'
@@ -62,6 +62,10 @@ def load_capture(path: File, node: Optional[int] = None) -> Capture:
     :param path: ``NAME.mcap`` or ``NAME.csv``
     :param node: of which node, where the file has several
     :raises MasterError: it cannot be read, or has nothing of the node
+
+    >>> ferrodrive.save_capture(drive.capture("velocity", duration=0.05, period=0.002), "run.csv")
+    >>> list(ferrodrive.load_capture("run.csv")["values"])
+    ['velocity_rpm']
     """
     return captured(_native.load_capture(os.fspath(path), node))
 
@@ -75,5 +79,10 @@ def tune_capture(path: File, node: Optional[int] = None, *, torque_constant: Opt
     :param node: of which node, where the file has several
     :param torque_constant: N m per A of its motor
     :raises MasterError: what it lacks, or why nothing can be said of it
+
+    >>> ferrodrive.save_capture(drive.capture("velocity", duration=0.05, period=0.002), "run.csv")
+    >>> ferrodrive.tune_capture("run.csv")
+    Traceback (most recent call last):
+    ferrodrive.errors.BadRequest: nothing can be found from the capture of node 5
     """
     return cast(CaptureTuning, _native.tune_capture(os.fspath(path), node, torque_constant))

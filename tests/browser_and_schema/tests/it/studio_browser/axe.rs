@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use serde_json::Value;
-
 use super::Stage;
 use super::safety::VIEWS;
 
@@ -20,13 +18,16 @@ const OPEN: &str = "document.querySelectorAll('#view details').forEach((one) => 
 /// The rules that depend on whether a page is light or dark.
 const COLOURS: &str = "['color-contrast', 'link-in-text-block']";
 
-/// A page whose state has just become stale (the machine is busy) is grey by intent: it is looked at again.
+/// A page whose state is stale (the machine is busy) is grey by intent, which is not what is looked at.
+const NOT_GREY: &str = "const sheet = document.styleSheets[0]; \
+    sheet.insertRule('.unseen #view, .unseen #bus-line, .unseen #tour { opacity: 1 !important }', sheet.cssRules.length)";
+
 fn run(only: Option<&str>) -> String {
     let only = only.map_or(String::new(), |only| format!("runOnly: {only},"));
     format!(
         "const done = arguments[arguments.length - 1]; \
-         axe.run(document, {{ {only} resultTypes: ['violations'] }}).then(({{ violations }}) => done(document.body.classList.contains('unseen') ? null : \
-         violations.map(({{ id, impact, nodes }}) => `${{impact}} ${{id}}: ${{nodes.map(({{ target }}) => target.join(' ')).join(', ')}}`)))"
+         axe.run(document, {{ {only} resultTypes: ['violations'] }}).then(({{ violations }}) => done(violations.map( \
+         ({{ id, impact, nodes }}) => `${{impact}} ${{id}}: ${{nodes.map(({{ target }}) => target.join(' ')).join(', ')}}`)))"
     )
 }
 
@@ -34,14 +35,10 @@ impl Stage {
     /// What axe finds in the page as it is, light and dark.
     async fn violations(&self) -> Vec<String> {
         let mut found = Vec::new();
+        self.script(NOT_GREY).await;
         for (theme, only) in [("light", None), ("dark", Some(COLOURS))] {
             self.script(&format!("document.documentElement.dataset.theme = '{theme}'")).await;
-            let of_theme = loop {
-                match self.client.execute_async(&run(only), Vec::new()).await.expect("axe runs") {
-                    Value::Null => {}
-                    violations => break violations,
-                }
-            };
+            let of_theme = self.client.execute_async(&run(only), Vec::new()).await.expect("axe runs");
             let of_theme = of_theme.as_array().expect("a list");
             found.extend(of_theme.iter().map(|text| format!("{theme}: {}", text.as_str().unwrap_or_default())));
         }
