@@ -48,10 +48,9 @@ def served(bench):
 
 def turn_until_the_end(process):
     """Turns the wheel of the scenario, and returns its report."""
-    ready = process.stdout.readline().split()
-    equal(ready[0], "ready", "the first line")
+    (address,) = json.loads(process.stdout.readline())["ready"]
     network = canopen.Network()
-    port = int(ready[1].rsplit(":", 1)[1])
+    port = int(address.rsplit(":", 1)[1])
     network.connect(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
     try:
         sdo = network.add_node(4, canopen.ObjectDictionary()).sdo
