@@ -78,9 +78,7 @@ impl StoreReport {
             effective_after_restart: after_restart.collect(),
         })
     }
-}
 
-impl StoreReport {
     /// As lines for people.
     pub fn text(&self, _: Paint) -> String {
         let named = |row: &Named| format!("{} {}", row.object, row.name.unwrap_or_default()).trim_end().to_owned();

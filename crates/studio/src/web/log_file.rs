@@ -1,8 +1,9 @@
 //! The frames of a log that a page has chosen, in any form that `ferrodrive` reads, with their times.
 
+use std::path::Path;
+
 use can::{Frame, Instant};
 use canlog::{Content, Entry, Format, LogReader, Record};
-use std::path::Path;
 
 /// The form of a log, by its content or else by its name.
 pub(super) fn format_of(name: &str, bytes: &[u8]) -> Option<Format> {
