@@ -76,29 +76,30 @@ fn findings() -> Result<Vec<Finding>, String> {
         std::fs::read_to_string(workspace::root().join(folder).join("Cargo.toml")).unwrap_or_default()
     });
     found.extend(dependencies::allowances(&packages));
+    let paths = tracked_files()?;
+    // Each core reads a part of the files.
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let parts = std::thread::scope(|scope| {
+        let parts: Vec<_> = paths.chunks(paths.len().div_ceil(cores).max(1)).collect();
+        let parts: Vec<_> =
+            parts.into_iter().map(|part| scope.spawn(|| part.iter().filter_map(|path| read(path)).collect())).collect();
+        parts.into_iter().map(std::thread::ScopedJoinHandle::join).collect::<Result<Vec<Vec<Read>>, _>>()
+    });
     let (mut sources, mut python) = (Vec::new(), Vec::new());
     // What a reader of the glossary may have read.
     let (mut glossary, mut read) = (String::new(), Vec::new());
-    for path in tracked_files()? {
-        // A file that is listed but deleted, or that is not text, has no style.
-        let Ok(text) = std::fs::read_to_string(workspace::root().join(&path)) else { continue };
-        TEXT_RULES.iter().for_each(|rule| found.extend(rule(&path, &text)));
-        let exists = |path: &str| workspace::root().join(path).exists();
-        found.extend(manifests::of_crates(&path, &text, exists));
-        found.extend(paths::of_page(&path, &text, exists));
-        found.extend(unsafe_code::of_manifest(&path, &text));
-        if path == glossary::PAGE {
-            glossary.clone_from(&text);
-        } else if [".rs", ".md", ".js", ".py"].iter().any(|ending| path.ends_with(ending)) {
-            read.push(text.to_lowercase());
+    for file in parts.map_err(|_| "a rule panicked")?.into_iter().flatten() {
+        found.extend(file.found);
+        sources.extend(file.source);
+        if file.path == glossary::PAGE {
+            glossary = file.text;
+            continue;
         }
-        if path.ends_with(".rs") {
-            let source = Source::new(&path, &text);
-            SOURCE_RULES.iter().for_each(|rule| found.extend(rule(&source)));
-            sources.push(source);
+        if [".rs", ".md", ".js", ".py"].iter().any(|ending| file.path.ends_with(ending)) {
+            read.push(file.text.to_lowercase());
         }
-        if path.ends_with(".py") {
-            python.push((path, text));
+        if file.path.ends_with(".py") {
+            python.push((file.path, file.text));
         }
     }
     let in_use = |word: &str| read.iter().any(|text| glossary::stands_in(word, text));
@@ -109,6 +110,27 @@ fn findings() -> Result<Vec<Finding>, String> {
     let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);
     found.sort();
     Ok(found)
+}
+
+/// A file, and what the rules about one file find in it.
+struct Read {
+    path: String,
+    text: String,
+    found: Vec<Finding>,
+    source: Option<Source>,
+}
+
+/// `None` for a file that is listed but deleted, or that is not text: it has no style.
+fn read(path: &str) -> Option<Read> {
+    let text = std::fs::read_to_string(workspace::root().join(path)).ok()?;
+    let exists = |path: &str| workspace::root().join(path).exists();
+    let mut found: Vec<Finding> = TEXT_RULES.iter().flat_map(|rule| rule(path, &text)).collect();
+    found.extend(manifests::of_crates(path, &text, exists));
+    found.extend(paths::of_page(path, &text, exists));
+    found.extend(unsafe_code::of_manifest(path, &text));
+    let source = path.ends_with(".rs").then(|| Source::new(path, &text));
+    found.extend(source.iter().flat_map(|source| SOURCE_RULES.iter().flat_map(|rule| rule(source))));
+    Some(Read { path: path.to_owned(), text, found, source })
 }
 
 /// Every file that is, or would be, under version control.

@@ -88,11 +88,11 @@ fn main() -> ExitCode {
 
 /// The command line as it was typed, or with its words in the order that was meant, where that does no harm.
 fn matches() -> Result<ArgMatches, clap::Error> {
-    let command = command_line();
-    let mut error = match command.clone().try_get_matches() {
+    let mut error = match command_line().try_get_matches() {
         Ok(matches) => return Ok(matches),
         Err(error) => error,
     };
+    let command = command_line();
     drop_advice_to_quote(&mut error);
     let Some(words) = std::env::args_os().skip(1).map(|word| word.into_string().ok()).collect::<Option<Vec<_>>>()
     else {

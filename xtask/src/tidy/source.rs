@@ -14,6 +14,8 @@ pub(crate) struct Source {
     pub(crate) shipped: String,
     /// Comments only.
     pub(crate) comments: String,
+    /// The offsets of the line breaks.
+    breaks: Vec<usize>,
 }
 
 impl Source {
@@ -26,6 +28,7 @@ impl Source {
             text: text.to_owned(),
             shipped,
             comments: view(text, &kinds, Kind::Comment),
+            breaks: text.match_indices('\n').map(|(at, _)| at).collect(),
             code,
         }
     }
@@ -40,7 +43,7 @@ impl Source {
 
     /// The 1-based line of a byte offset.
     pub(crate) fn line_of(&self, offset: usize) -> usize {
-        self.text.as_bytes()[..offset].iter().filter(|&&byte| byte == b'\n').count() + 1
+        self.breaks.partition_point(|&at| at < offset) + 1
     }
 }
 

@@ -97,6 +97,11 @@ pub(super) fn habits(path: &str, text: &str) -> Vec<Finding> {
 }
 
 fn finding(path: &str, habit: &Habit, phrase: &str, words: &[Word], at: usize) -> Option<Finding> {
+    // Most words begin no phrase.
+    let rest = phrase.strip_prefix(&*words[at].text)?;
+    if !rest.is_empty() && !rest.starts_with(' ') {
+        return None;
+    }
     let length = phrase.split(' ').count();
     let here = words.get(at..at + length)?;
     let same = phrase.split(' ').zip(here).all(|(wanted, word)| word.text == wanted);

@@ -449,8 +449,8 @@ impl Bench {
         let waited = self.world.now() - ended_at;
         let stood = self.time_to_standstill(Duration::from_secs(10));
         assert!(stood.is_some_and(|time| time <= watch + Duration::from_secs(1)), "{what}: {stood:?}");
-        // And stays so, whatever is still sent.
-        self.world.run_for(Duration::from_secs(6));
+        // And stays so, whatever is still sent: longer than any watch waits, and than a frozen program sleeps.
+        self.world.run_for(Duration::from_secs(if end == End::Frozen { 6 } else { 3 }));
         assert!(self.fastest() < 1.0, "{what}: turns again at {} r/min", self.fastest());
         drop(kept);
         Stood::After(said.unwrap_or(waited + stood.unwrap()))
