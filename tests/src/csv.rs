@@ -2,19 +2,19 @@
 
 /// A table: rows of fields that are found by the name in the header.
 #[derive(Debug)]
-pub struct Table {
+pub struct CsvTable {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-/// One row of a [`Table`].
+/// One row of a [`CsvTable`].
 #[derive(Debug, Clone, Copy)]
 pub struct Row<'a> {
     header: &'a [String],
     fields: &'a [String],
 }
 
-impl Table {
+impl CsvTable {
     /// Reads a table. The first line is the header.
     ///
     /// # Errors
@@ -73,13 +73,13 @@ mod tests {
 
     #[test]
     fn commas_and_quotes_inside_quotes_belong_to_the_field() {
-        let table = Table::parse("a,b,c\n1,\"x, \"\"y\"\"\",\n").unwrap();
+        let table = CsvTable::parse("a,b,c\n1,\"x, \"\"y\"\"\",\n").unwrap();
         let row = table.rows().next().unwrap();
         assert_eq!((row.get("a"), row.get("b"), row.get("c")), ("1", "x, \"y\"", ""));
     }
 
     #[test]
     fn a_line_with_too_few_fields_is_named() {
-        assert_eq!(Table::parse("a,b\n1,2\n3\n").unwrap_err(), 3);
+        assert_eq!(CsvTable::parse("a,b\n1,2\n3\n").unwrap_err(), 3);
     }
 }

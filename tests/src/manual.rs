@@ -4,7 +4,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::csv::{Row, Table};
+use crate::csv::{CsvTable, Row};
 
 /// A row of an object dictionary.
 #[derive(Debug, Clone)]
@@ -135,7 +135,7 @@ impl Datagram {
 
 /// Reads each row of a file.
 pub(crate) fn rows<T>(text: &str, read: fn(Row<'_>) -> T) -> Vec<T> {
-    let table = Table::parse(text).unwrap_or_else(|line| panic!("line {line} has another number of fields"));
+    let table = CsvTable::parse(text).unwrap_or_else(|line| panic!("line {line} has another number of fields"));
     table.rows().map(read).collect()
 }
 

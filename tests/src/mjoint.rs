@@ -54,7 +54,7 @@ pub struct HomingStatus {
 
 /// A figure of the technical data, for the four models.
 #[derive(Debug, Clone)]
-pub struct Figure {
+pub struct MotorFigures {
     /// The group of the table: `motor`, `reducer`.
     pub group: String,
     /// What is reported.
@@ -109,8 +109,8 @@ pub fn homing_runs() -> Vec<HomingStatus> {
 
 /// The technical data.
 #[must_use]
-pub fn figures() -> Vec<Figure> {
-    rows(include_str!("../data/mjoint/models.csv"), |row| Figure {
+pub fn figures() -> Vec<MotorFigures> {
+    rows(include_str!("../data/mjoint/models.csv"), |row| MotorFigures {
         group: row.get("group").to_owned(),
         parameter: row.get("parameter").to_owned(),
         unit: row.get("unit").to_owned(),

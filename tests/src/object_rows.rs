@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use can::{CanId, Frame};
 
-use crate::bench::{Abort, Bench, Subject};
+use crate::bench::{Abort, Bench, BenchSubject};
 use crate::manual::{ObjectRow, hex, integer, rows};
 
 /// Abort codes of CiA 301, 7.2.4.3.17.
@@ -43,13 +43,13 @@ pub struct Memory {
 }
 
 /// A drive that stores each write, or all on command.
-pub trait KeepingSubject: Subject {
+pub trait KeepingSubject: BenchSubject {
     /// How.
     const MEMORY: Memory;
 }
 
 /// Every row is read with its width, and with its default unless it is a measurement.
-pub fn are_read_with_their_width_and_default<S: Subject>() {
+pub fn are_read_with_their_width_and_default<S: BenchSubject>() {
     assert_rows::<S>(
         |_| true,
         |row| {
@@ -65,7 +65,7 @@ pub fn are_read_with_their_width_and_default<S: Subject>() {
 }
 
 /// What is read-only refuses a write.
-pub fn refuse_writes_where_they_are_read_only<S: Subject>() {
+pub fn refuse_writes_where_they_are_read_only<S: BenchSubject>() {
     assert_rows::<S>(
         |row| !row.writable,
         |row| expect("a write", Bench::<S>::new().write((row.index, row.sub), 1), Err(READ_ONLY)),
@@ -73,7 +73,7 @@ pub fn refuse_writes_where_they_are_read_only<S: Subject>() {
 }
 
 /// Both ends of a range are taken, and what lies beyond is refused with the code for it and not stored.
-pub fn take_their_range_and_refuse_what_lies_beyond<S: Subject>() {
+pub fn take_their_range_and_refuse_what_lies_beyond<S: BenchSubject>() {
     assert_rows::<S>(
         |row| row.writable && row.limits.is_some(),
         |row| {
@@ -88,7 +88,7 @@ pub fn take_their_range_and_refuse_what_lies_beyond<S: Subject>() {
 }
 
 /// Refused with `code`, or as a value that is not in a list, and not stored.
-fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), String> {
+fn refused<S: BenchSubject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), String> {
     if !row.type_range().contains(&value) {
         return Ok(());
     }
@@ -103,7 +103,7 @@ fn refused<S: Subject>(row: &ObjectRow, value: i64, code: Abort) -> Result<(), S
 
 /// `refused.csv`: objects and sub-indexes that the manual does not have are distinguished, and so are values that lie between
 /// the listed ones. An empty value is a read.
-pub fn refuse_what_the_manual_does_not_have<S: Subject>() {
+pub fn refuse_what_the_manual_does_not_have<S: BenchSubject>() {
     for (index, sub, value, abort) in rows(S::REFUSED, |row| {
         let abort = u32::from_str_radix(row.get("abort"), 16).expect("an abort code");
         (hex(row.get("index")), hex(row.get("sub")) as u8, integer(row.get("value")), abort)
@@ -118,7 +118,7 @@ pub fn refuse_what_the_manual_does_not_have<S: Subject>() {
 }
 
 /// A write of another width is refused with the code for it and changes nothing.
-pub fn refuse_another_width<S: Subject>() {
+pub fn refuse_another_width<S: BenchSubject>() {
     assert_rows::<S>(
         |row| row.writable,
         |row| {
@@ -142,7 +142,7 @@ pub fn refuse_another_width<S: Subject>() {
 }
 
 /// `at_rest.csv`: what every measurement and state reads at a drive that has just booted and rests.
-pub fn read_at_rest_what_a_resting_drive_has<S: Subject>() {
+pub fn read_at_rest_what_a_resting_drive_has<S: BenchSubject>() {
     let expected = rows(S::AT_REST, |row| {
         let bound = |name| integer(row.get(name)).expect("a number");
         ((hex(row.get("index")), hex(row.get("sub")) as u8), bound("low")..=bound("high"))
@@ -254,7 +254,7 @@ pub fn are_saved_together_or_not_at_all<S: KeepingSubject>() {
 
 impl Memory {
     /// Another legal value of a writable object than the default; `None` where the drive could not be asked any more.
-    fn other_value<S: Subject>(&self, row: &ObjectRow) -> Option<i64> {
+    fn other_value<S: BenchSubject>(&self, row: &ObjectRow) -> Option<i64> {
         let default = row.default?;
         if !row.writable || self.without.contains(&row.index) {
             return None;
@@ -271,12 +271,12 @@ impl Memory {
     }
 
     /// That value, and the default.
-    fn values<S: Subject>(&self, row: &ObjectRow) -> (i64, i64) {
+    fn values<S: BenchSubject>(&self, row: &ObjectRow) -> (i64, i64) {
         (self.other_value::<S>(row).unwrap_or_default(), row.default.unwrap_or_default())
     }
 
     /// Off and on; the host follows to the node that the drive has with `kept` in the row.
-    fn restart<S: Subject>(&self, bench: &mut Bench<S>, row: &ObjectRow, kept: i64) {
+    fn restart<S: BenchSubject>(&self, bench: &mut Bench<S>, row: &ObjectRow, kept: i64) {
         bench.power_cycle();
         let moves = self.node_id == Some(row.index);
         bench.node = if moves { u8::try_from(kept).expect("a node") } else { S::NODE };
@@ -289,7 +289,7 @@ fn velocity_mapping(row: &ObjectRow) -> i64 {
 }
 
 /// Writes the value the way the object wants it: mapping entries while sub-index 00 is 0.
-fn write_other<S: Subject>(bench: &mut Bench<S>, row: &ObjectRow, value: i64) -> Result<(), String> {
+fn write_other<S: BenchSubject>(bench: &mut Bench<S>, row: &ObjectRow, value: i64) -> Result<(), String> {
     if matches!(row.index, 0x1600..=0x1603 | 0x1A00..=0x1A03) {
         expect("clear the mapping", bench.write(row.index, 0), Ok(()))?;
         if row.sub == 0 && value == 1 {
@@ -303,7 +303,7 @@ fn write_other<S: Subject>(bench: &mut Bench<S>, row: &ObjectRow, value: i64) ->
 }
 
 /// Asserts that `check` finds nothing wrong with any row that `of` picks, and that it picks some.
-fn assert_rows<S: Subject>(of: impl Fn(&ObjectRow) -> bool, check: impl Fn(&ObjectRow) -> Result<(), String>) {
+fn assert_rows<S: BenchSubject>(of: impl Fn(&ObjectRow) -> bool, check: impl Fn(&ObjectRow) -> Result<(), String>) {
     let rows: Vec<_> = S::rows().all().iter().filter(|row| of(row)).collect();
     assert!(!rows.is_empty());
     let at = |row: &ObjectRow, text| format!("{:04X}h:{:02X} {}: {text}", row.index, row.sub, row.name);

@@ -6,13 +6,13 @@
 
 use sim::Component;
 
-use crate::bench::{Bench, Subject};
+use crate::bench::{Bench, BenchSubject};
 use crate::manual::PowerCell;
 
 const UNSEEN: [&str; 2] = ["not_ready_to_switch_on", "fault_reaction_active"];
 
 /// A drive with the power state machine of CiA 402.
-pub trait PowerSubject: Subject {
+pub trait PowerSubject: BenchSubject {
     /// A component whose break is a fault in every state, and which can be mended.
     const BREAKABLE: Component;
 

@@ -1,6 +1,6 @@
 //! A host that writes anything anywhere, while the world of the machine changes at random.
 
-use crate::bench::{Bench, Subject};
+use crate::bench::{Bench, BenchSubject};
 use crate::manual::ObjectRow;
 use crate::seeded::Seeded;
 
@@ -28,7 +28,7 @@ pub struct Play<S> {
 
 /// Every write is answered, every number that can be measured stays finite, every statusword is one of a state, and in
 /// the end the drive recovers.
-pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
+pub fn is_answered_and_breaks_nothing<S: BenchSubject>(play: &Play<S>) {
     let writable = |row: &&ObjectRow| row.writable && !play.spared.contains(&row.index);
     let rows: Vec<_> = S::rows().all().iter().filter(writable).collect();
     let commands: Vec<_> = rows.iter().copied().filter(|row| COMMANDS.contains(&row.index)).collect();
@@ -59,7 +59,7 @@ pub fn is_answered_and_breaks_nothing<S: Subject>(play: &Play<S>) {
     }
 }
 
-fn act<S: Subject>(bench: &mut Bench<S>, line: &str) {
+fn act<S: BenchSubject>(bench: &mut Bench<S>, line: &str) {
     match line.strip_prefix("> ") {
         Some(frame) => bench.send(frame),
         None if line.is_empty() => bench,

@@ -31,7 +31,7 @@ pub struct HomingResult {
 
 /// A figure of the technical data, of a table of settings, or of the address switches.
 #[derive(Debug, Clone)]
-pub struct Figure {
+pub struct MotorFigures {
     /// The table it belongs to: `model`, `current`, `microstep`.
     pub table: String,
     /// The row within that: a model, a setting.
@@ -88,8 +88,8 @@ fn homing_results(file: &str) -> Vec<HomingResult> {
 
 /// The technical data of both lengths and the tables of settings.
 #[must_use]
-pub fn figures() -> Vec<Figure> {
-    rows(include_str!("../data/zlim42c/models.csv"), |row| Figure {
+pub fn figures() -> Vec<MotorFigures> {
+    rows(include_str!("../data/zlim42c/models.csv"), |row| MotorFigures {
         table: row.get("table").to_owned(),
         row: row.get("row").to_owned(),
         quantity: row.get("quantity").to_owned(),
@@ -113,7 +113,7 @@ pub fn figure(table: &str, row: &str, quantity: &str) -> f64 {
 
 /// The code of a fault (603Fh) in the figures.
 #[must_use]
-pub fn fault_code(row: &Figure) -> u16 {
+pub fn fault_code(row: &MotorFigures) -> u16 {
     hex(&row.row)
 }
 

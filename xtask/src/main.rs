@@ -71,6 +71,10 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words.as_slice() {
+        words if words.is_empty() || words.iter().any(|word| ["help", "--help", "-h"].contains(word)) => {
+            print!("{USAGE}");
+            ExitCode::SUCCESS
+        }
         ["test", rest @ ..] => test::command(rest),
         ["tidy"] => tidy::command(),
         ["defects", rest @ ..] => defects::command(rest),
@@ -85,10 +89,6 @@ fn main() -> ExitCode {
         ["idle", rest @ ..] => idle::command(rest),
         ["bench", rest @ ..] => bench::command(rest),
         ["times", rest @ ..] => times::command(rest),
-        [] | ["help" | "--help" | "-h"] => {
-            print!("{USAGE}");
-            ExitCode::SUCCESS
-        }
         _ => {
             eprint!("unknown chore: {}\n\n{USAGE}", words.join(" "));
             ExitCode::from(2)

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// One step: its name for `--only`, what it does for the progress line, when it runs, and the function that does it.
-pub(crate) struct Step {
+pub(crate) struct TestStep {
     pub(crate) name: &'static str,
     pub(crate) does: &'static str,
     pub(crate) when: When,
@@ -34,94 +34,109 @@ pub(crate) enum When {
     Named,
 }
 
-pub(crate) const STEPS: &[Step] = &[
-    Step { name: "fmt", does: "is every file formatted as cargo fmt would", when: When::Quick, run: fmt },
-    Step { name: "tidy", does: "the house rules that a program can check", when: When::Quick, run: tidy::step },
-    Step {
+pub(crate) const STEPS: &[TestStep] = &[
+    TestStep { name: "fmt", does: "is every file formatted as cargo fmt would", when: When::Quick, run: fmt },
+    TestStep { name: "tidy", does: "the house rules that a program can check", when: When::Quick, run: tidy::step },
+    TestStep {
         name: "tests",
         does: "unit, property and integration tests of every crate, in virtual time",
         when: When::Quick,
         run: tests,
     },
-    Step { name: "doctests", does: "the code in the documentation", when: When::Quick, run: doctests },
-    Step {
+    TestStep { name: "doctests", does: "the code in the documentation", when: When::Quick, run: doctests },
+    TestStep {
         name: "demo",
         does: "every procedure of the manuals against the virtual drives",
         when: When::Quick,
         run: program::demo,
     },
-    Step { name: "core", does: "the core crates compile for a Cortex-M4F", when: When::Quick, run: bare_metal::step },
-    Step {
+    TestStep {
+        name: "core",
+        does: "the core crates compile for a Cortex-M4F",
+        when: When::Quick,
+        run: bare_metal::step,
+    },
+    TestStep {
         name: "build",
         does: "the programs and tests that the steps behind this one run",
         when: When::Building,
         run: build,
     },
-    Step { name: "clippy", does: "lints of every target, warnings are errors", when: When::Busy, run: clippy },
-    Step { name: "docs", does: "the documentation builds and its links work", when: When::Busy, run: docs },
-    Step { name: "packages", does: "every crate packs, as cargo publish would", when: When::Busy, run: packages::run },
-    Step {
+    TestStep { name: "clippy", does: "lints of every target, warnings are errors", when: When::Busy, run: clippy },
+    TestStep { name: "docs", does: "the documentation builds and its links work", when: When::Busy, run: docs },
+    TestStep {
+        name: "packages",
+        does: "every crate packs, as cargo publish would",
+        when: When::Busy,
+        run: packages::run,
+    },
+    TestStep {
         name: "no_std",
         does: "what a node and a drive take of a Cortex-M4F",
         when: When::Busy,
         run: bare_metal::sizes_step,
     },
-    Step {
+    TestStep {
         name: "python",
         does: "the Python package: its wheel builds, and its tests pass against the installed wheel",
         when: When::Busy,
         run: python::step,
     },
-    Step {
+    TestStep {
         name: "dist",
         does: "what is released can be made, and works from an empty folder",
         when: When::Busy,
         run: dist::step,
     },
-    Step {
+    TestStep {
         name: "examples",
         does: "every example runs, to its end or until it is ready to serve",
         when: When::Busy,
         run: examples::run,
     },
-    Step {
+    TestStep {
         name: "peers",
         does: "canopen-python, python-can and pymodbus against ferrodrive sim",
         when: When::Busy,
         run: peers::run,
     },
-    Step { name: "page", does: "what the studio's page computes and says, by node", when: When::Busy, run: page::step },
-    Step {
+    TestStep {
+        name: "page",
+        does: "what the studio's page computes and says, by node",
+        when: When::Busy,
+        run: page::step,
+    },
+    TestStep {
         name: "studio",
         does: "the studio's page in a real browser: enable, move, jog, close the tab",
         when: When::Waiting,
         run: browser::step,
     },
-    Step {
+    TestStep {
         name: "vcan",
         does: "CAN interfaces of Linux, in a virtual machine that has them",
         when: When::Waiting,
         run: vcan::step,
     },
-    Step {
+    TestStep {
         name: "real_time",
         does: "processes in real time: servers, signals, sockets, terminals",
         when: When::Waiting,
         run: real_time,
     },
-    Step {
+    TestStep {
         name: "schema",
         does: "JSON of every command, and control connections, by their schemas",
         when: When::Waiting,
         run: schema,
     },
-    Step {
+    TestStep {
         name: "web",
         does: "the page without a server: runs equal to the native ones, in node and a browser; its compiler takes three minutes",
         when: When::Named,
         run: web::step,
     },
-    Step {
+    TestStep {
         name: "aarch64",
         does: "what is released for aarch64, by cross tools, its program run by QEMU; everything is compiled anew",
         when: When::Named,

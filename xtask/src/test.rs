@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::since;
-use crate::steps::{FETCHES, STEPS, Step, When};
+use crate::steps::{FETCHES, STEPS, TestStep, When};
 use crate::table::{StepRow, conclude, seconds, sum};
 use crate::{libtest, say};
 
@@ -16,7 +16,7 @@ const WAITING_AT_A_TIME: usize = 2;
 pub(crate) fn command(words: &[&str]) -> ExitCode {
     match choose(words) {
         Ok(Choice::List) => {
-            let when = |step: &Step| match step.when {
+            let when = |step: &TestStep| match step.when {
                 When::Quick => "quick ",
                 When::Building | When::Busy | When::Waiting => "--all ",
                 When::Named => "--only",
@@ -35,7 +35,7 @@ pub(crate) fn command(words: &[&str]) -> ExitCode {
 
 enum Choice {
     List,
-    Run(Vec<&'static Step>),
+    Run(Vec<&'static TestStep>),
     Since(String),
 }
 
@@ -64,13 +64,13 @@ fn choose(words: &[&str]) -> Result<Choice, String> {
         }
     }
     if steps.is_empty() {
-        let is_meant = |step: &&Step| step.when == When::Quick || all && step.when != When::Named;
+        let is_meant = |step: &&TestStep| step.when == When::Quick || all && step.when != When::Named;
         steps = STEPS.iter().filter(is_meant).collect();
     }
     Ok(Choice::Run(steps))
 }
 
-fn run(steps: &[&'static Step]) -> ExitCode {
+fn run(steps: &[&'static TestStep]) -> ExitCode {
     let start = Instant::now();
     let of = |when: When| steps.iter().copied().filter(move |step| step.when == when);
     let rows = Mutex::new(Vec::new());
@@ -103,7 +103,7 @@ fn run(steps: &[&'static Step]) -> ExitCode {
 }
 
 /// What these steps take of others. What fails here fails again in its step, which reports it.
-fn fetch_for(steps: &[&'static Step]) {
+fn fetch_for(steps: &[&'static TestStep]) {
     say::work_for(Some("fetch"));
     for (_, fetch) in FETCHES.iter().filter(|(name, _)| steps.iter().any(|step| step.name == *name)) {
         let _ = fetch();
@@ -115,7 +115,7 @@ fn ran(rows: &[StepRow], name: &str) -> bool {
 }
 
 /// Runs a step; `beside` others, each of its lines begins with its name.
-fn run_one(step: &'static Step, beside: bool, rows: &Mutex<Vec<StepRow>>) {
+fn run_one(step: &'static TestStep, beside: bool, rows: &Mutex<Vec<StepRow>>) {
     println!("[{}] {}", step.name, step.does);
     say::work_for(beside.then_some(step.name));
     let start = Instant::now();

@@ -83,7 +83,7 @@ fn findings() -> Result<Vec<Finding>, String> {
         let parts: Vec<_> = paths.chunks(paths.len().div_ceil(cores).max(1)).collect();
         let parts: Vec<_> =
             parts.into_iter().map(|part| scope.spawn(|| part.iter().filter_map(|path| read(path)).collect())).collect();
-        parts.into_iter().map(std::thread::ScopedJoinHandle::join).collect::<Result<Vec<Vec<Read>>, _>>()
+        parts.into_iter().map(std::thread::ScopedJoinHandle::join).collect::<Result<Vec<Vec<CheckedFile>>, _>>()
     });
     let (mut sources, mut python) = (Vec::new(), Vec::new());
     // What a reader of the glossary may have read.
@@ -113,7 +113,7 @@ fn findings() -> Result<Vec<Finding>, String> {
 }
 
 /// A file, and what the rules about one file find in it.
-struct Read {
+struct CheckedFile {
     path: String,
     text: String,
     found: Vec<Finding>,
@@ -121,7 +121,7 @@ struct Read {
 }
 
 /// `None` for a file that is listed but deleted, or that is not text: it has no style.
-fn read(path: &str) -> Option<Read> {
+fn read(path: &str) -> Option<CheckedFile> {
     let text = std::fs::read_to_string(workspace::root().join(path)).ok()?;
     let exists = |path: &str| workspace::root().join(path).exists();
     let mut found: Vec<Finding> = TEXT_RULES.iter().flat_map(|rule| rule(path, &text)).collect();
@@ -130,7 +130,7 @@ fn read(path: &str) -> Option<Read> {
     found.extend(unsafe_code::of_manifest(path, &text));
     let source = path.ends_with(".rs").then(|| Source::new(path, &text));
     found.extend(source.iter().flat_map(|source| SOURCE_RULES.iter().flat_map(|rule| rule(source))));
-    Some(Read { path: path.to_owned(), text, found, source })
+    Some(CheckedFile { path: path.to_owned(), text, found, source })
 }
 
 /// Every file that is, or would be, under version control.

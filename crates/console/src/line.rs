@@ -18,7 +18,7 @@ use words::plain;
 
 use crate::command::object::ObjectReport;
 use crate::command::read::Read;
-use crate::command::{Command, Effect};
+use crate::command::{Command, CommandEffect};
 use crate::context::{Context, Holding, Others, Shell, Stated};
 use crate::guard::GuardArgs;
 
@@ -64,28 +64,28 @@ impl host::console::Reader for Reader {
         })?;
         let CommandLine { command } = CommandLine::from_arg_matches(&matches).map_err(|error| said(&error))?;
         let effect = match &command {
-            LineCommand::Read(_) => Effect::None,
+            LineCommand::Read(_) => CommandEffect::None,
             LineCommand::OnBus(command) => {
                 check(command)?;
                 command.effect()
             }
         };
         let asked = match effect {
-            Effect::None => None,
-            Effect::Writes(node, object, value) => {
+            CommandEffect::None => None,
+            CommandEffect::Writes(node, object, value) => {
                 let values = vec![NewValue { object, value }];
                 let write = ParameterChange::WriteParameters { values, file: None };
                 Some(NodeCommand::Change(write).to(node))
             }
-            Effect::Stores(node) => Some(NodeCommand::Change(ParameterChange::Store {}).to(node)),
-            Effect::Manages(node, command) => Some(NodeCommand::Pdos(PdoCommand::Nmt { command }).to(node)),
-            Effect::ManagesMore => {
+            CommandEffect::Stores(node) => Some(NodeCommand::Change(ParameterChange::Store {}).to(node)),
+            CommandEffect::Manages(node, command) => Some(NodeCommand::Pdos(PdoCommand::Nmt { command }).to(node)),
+            CommandEffect::ManagesMore => {
                 let text = "error: a page resets and stops no node by NMT, and commands no two at once\n  next:    nmt NODE start, or nmt NODE pre-operational; the program does the others";
                 return Err(Said::senseless(text.to_owned()));
             }
-            Effect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
-            Effect::StopAll => Some(Asked::STOP_ALL),
-            Effect::StopAllByRamp => {
+            CommandEffect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
+            CommandEffect::StopAll => Some(Asked::STOP_ALL),
+            CommandEffect::StopAllByRamp => {
                 let text = "error: a page does not stop all drives by their ramps\n  next:    estop stops them at once; stop NODE one of them by its ramp";
                 return Err(Said::senseless(text.to_owned()));
             }

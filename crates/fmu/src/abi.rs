@@ -21,11 +21,11 @@ use std::sync::PoisonError;
 
 use crate::call::{CallError, Called};
 use held::{LoggedInstance, instance};
-use status::{DEFECT, ERROR, FATAL, OK, Status};
+use status::{DEFECT, ERROR, FATAL, FmiStatus, OK};
 
 /// Carries out a call on an instance; what goes wrong is reported to the importer's log. After a panic the instance is of no use
 /// until it is reset.
-fn call(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Called<()>) -> Status {
+fn call(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Called<()>) -> FmiStatus {
     carry_out(handle, |held| {
         if held.is_broken {
             return Err((FATAL, "an earlier call ended with Fatal; Reset makes the instance anew".to_owned()));
@@ -35,7 +35,10 @@ fn call(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Called<()
 }
 
 /// The same, also after a panic.
-fn carry_out(handle: *mut c_void, work: impl FnOnce(&mut LoggedInstance) -> Result<(), (Status, String)>) -> Status {
+fn carry_out(
+    handle: *mut c_void,
+    work: impl FnOnce(&mut LoggedInstance) -> Result<(), (FmiStatus, String)>,
+) -> FmiStatus {
     let Some(instance) = instance(handle) else { return ERROR };
     let (log, done) = {
         // No panic leaves this block: the lock is never poisoned.
@@ -109,10 +112,10 @@ mod tests {
     use crate::instance::Instance;
 
     /// What was said, and by whom.
-    static SAID: Mutex<Vec<(usize, Status, String)>> = Mutex::new(Vec::new());
+    static SAID: Mutex<Vec<(usize, FmiStatus, String)>> = Mutex::new(Vec::new());
 
     /// A log of an importer that reads time from the instance that has something to say.
-    unsafe extern "C" fn log(place: *mut c_void, status: Status, category: *const c_char, message: *const c_char) {
+    unsafe extern "C" fn log(place: *mut c_void, status: FmiStatus, category: *const c_char, message: *const c_char) {
         let mut time = [f64::NAN];
         // SAFETY: the place of the test's handle, which outlives the call; texts of the caller's.
         let (handle, message, category) =
@@ -195,9 +198,9 @@ mod tests {
         life::fmi3FreeInstance(handle);
     }
 
-    static REPORTED: Mutex<Vec<(Status, String)>> = Mutex::new(Vec::new());
+    static REPORTED: Mutex<Vec<(FmiStatus, String)>> = Mutex::new(Vec::new());
 
-    unsafe extern "C" fn report(_: *mut c_void, status: Status, category: *const c_char, message: *const c_char) {
+    unsafe extern "C" fn report(_: *mut c_void, status: FmiStatus, category: *const c_char, message: *const c_char) {
         // SAFETY: texts of the caller's.
         let (category, message) = unsafe { (CStr::from_ptr(category), CStr::from_ptr(message)) };
         assert_eq!(category, c"logStatusFatal");

@@ -5,7 +5,7 @@ use crate::variable::Value;
 
 /// A type of FMI 2.0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum VariableKind {
     /// A 64-bit floating-point number; also whole numbers that need more than 32 bits.
     Real,
     /// A signed integer of 32 bits.
@@ -16,7 +16,7 @@ pub enum Kind {
     String,
 }
 
-impl Kind {
+impl VariableKind {
     /// The type of such a value.
     pub const fn of(value: &Value) -> Self {
         match value {

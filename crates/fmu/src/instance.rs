@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::call::{CallError, Called, refused};
 use crate::config::{Config, ConfigError, TxClock};
-use crate::fmi2::Kind;
+use crate::fmi2::VariableKind;
 use crate::journal::Journal;
 use crate::unit::{Action, Unit};
 use crate::variable::{Causality, Reference, Terminal, Value, Variable};
@@ -493,7 +493,7 @@ impl Instance {
 
     /// The type of a value in the instance's version of FMI.
     const fn type_name(&self, value: &Value) -> &'static str {
-        if self.is_of_fmi2() { Kind::of(value).element() } else { value.type_name() }
+        if self.is_of_fmi2() { VariableKind::of(value).element() } else { value.type_name() }
     }
 
     fn expect(&self, modes: &[Mode], call: &str) -> Called<()> {

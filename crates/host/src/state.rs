@@ -108,7 +108,7 @@ pub struct Host {
     /// Captures under way.
     pub(crate) captures: BTreeMap<NodeId, CaptureRun>,
     /// What was captured of each node, newest first, for its report.
-    pub(crate) captured: BTreeMap<NodeId, Vec<report::Capture>>,
+    pub(crate) captured: BTreeMap<NodeId, Vec<report::ReportedCapture>>,
     /// Gains that were proposed to the session that has control, and not tried yet.
     pub(crate) tuned: BTreeMap<NodeId, Box<Tuned>>,
     /// What the last tuning of each node came to, for its report.

@@ -1,7 +1,7 @@
 //! Layout and drawing: where panels, ticks, labels and marks go.
 
 use crate::lanes;
-use crate::poster::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
+use crate::poster::{Colour, EventKind, Figure, Panel, PlotEvent, Poster, Style, Trace};
 use crate::svg::{Anchor, Font, Scale, Svg};
 use crate::thin::thin;
 use crate::ticks::{self, Ticks};
@@ -99,7 +99,7 @@ pub(crate) fn poster(poster: &Poster, scripted: bool) -> String {
 
 /// One figure; gives where the next one may begin.
 fn figure(svg: &mut Svg, figure: &Figure, (left, right): (f64, f64), top: f64, number: usize) -> f64 {
-    let mut events: Vec<&Event> = figure.events.iter().collect();
+    let mut events: Vec<&PlotEvent> = figure.events.iter().collect();
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let section_strip = if figure.sections.is_empty() { 0.0 } else { SECTION_STRIP };
     let top = top + TOP;
@@ -228,7 +228,7 @@ fn last_value(trace: &Trace) -> f64 {
 }
 
 /// A lane for each event's label, so that labels do not overlap.
-fn event_lanes(layout: &Layout<'_>, events: &[&Event]) -> Vec<usize> {
+fn event_lanes(layout: &Layout<'_>, events: &[&PlotEvent]) -> Vec<usize> {
     let spans: Vec<(f64, f64)> = events
         .iter()
         .map(|event| {
@@ -240,13 +240,13 @@ fn event_lanes(layout: &Layout<'_>, events: &[&Event]) -> Vec<usize> {
 }
 
 /// Labels begin at their mark, or end at the right border when they would leave the picture.
-fn label_left(layout: &Layout<'_>, event: &Event) -> f64 {
+fn label_left(layout: &Layout<'_>, event: &PlotEvent) -> f64 {
     let width = event_font(event.kind).width(&event.label);
     (layout.x(event.at_s) + 6.0).min(layout.right + RIGHT - 14.0 - width)
 }
 
 /// All lines first, so that none runs over a label.
-fn draw_events(svg: &mut Svg, layout: &Layout<'_>, events: &[&Event], lanes: &[usize]) {
+fn draw_events(svg: &mut Svg, layout: &Layout<'_>, events: &[&PlotEvent], lanes: &[usize]) {
     let places = || {
         let heights = lanes.iter().map(|lane| layout.event_top + *lane as f64 * EVENT_LANE + 12.0);
         events.iter().zip(heights).map(|(event, y)| (*event, layout.x(event.at_s), y))
@@ -400,7 +400,7 @@ mod tests {
                 number: "4.1".into(),
                 names: vec!["x".repeat(500), "short".into()],
             }],
-            events: vec![Event { at_s: 3.0, label: "quick stop".into(), kind: EventKind::Stop }],
+            events: vec![PlotEvent { at_s: 3.0, label: "quick stop".into(), kind: EventKind::Stop }],
             cuts: vec![(12.0, 16.0)],
         }
     }

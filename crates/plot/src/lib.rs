@@ -30,7 +30,7 @@ mod ticks;
 mod xml;
 
 pub use paint::Paint;
-pub use poster::{Colour, Event, EventKind, Figure, Panel, Poster, Section, Style, Trace};
+pub use poster::{Colour, EventKind, Figure, Panel, PlotEvent, Poster, Section, Style, Trace};
 pub use table::Table;
 pub use xml::escaped;
 

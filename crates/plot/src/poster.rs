@@ -29,7 +29,7 @@ pub struct Figure {
     /// Spans of time with a name, not overlapping.
     pub sections: Vec<Section>,
     /// Marked moments.
-    pub events: Vec<Event>,
+    pub events: Vec<PlotEvent>,
     /// Spans of time that are left out, ascending; a mark on the time axis shows each.
     pub cuts: Vec<(f64, f64)>,
 }
@@ -118,7 +118,7 @@ pub struct Section {
 
 /// A moment.
 #[derive(Clone, Debug)]
-pub struct Event {
+pub struct PlotEvent {
     /// When, s.
     pub at_s: f64,
     /// What happened, in a few words.

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use plot::{Colour, Event, EventKind, Figure, Panel, Poster, Style, Trace};
+use plot::{Colour, EventKind, Figure, Panel, PlotEvent, Poster, Style, Trace};
 
 use super::capture::ABOUT;
 use super::column::{Column, Subject, select};
@@ -124,7 +124,7 @@ fn figure(
             && !QUIET.contains(&&*mark.kind)
             && span.contains(&mark.at.as_secs_f64())
     });
-    let events = marks.map(|mark| Event {
+    let events = marks.map(|mark| PlotEvent {
         at_s: mark.at.as_secs_f64(),
         label: mark.text.clone(),
         kind: match mark.severity {

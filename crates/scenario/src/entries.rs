@@ -8,7 +8,7 @@ use sim::command::Command as WorldCommand;
 use super::command::{Command, PdoCommand};
 use super::condition::{Condition, signal};
 use super::plan::{
-    Act, Base, Expect, Figure, Host, HostLine, Law, Measure, ScenarioStep, Statistic, Until, WantedResult,
+    Act, Base, Expect, Host, HostLine, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until, WantedResult,
 };
 use words::document::Problem;
 use words::document::reader::{Field, Table};
@@ -280,14 +280,14 @@ fn expectation(table: &Table<'_>, n: usize) -> Result<Expect, Problem> {
     Ok(Expect { name, law, condition, from, until, asked, place: field.problem("").locate(table.text()) })
 }
 
-pub(super) fn figures(file: &Table<'_>) -> Many<Vec<Figure>> {
+pub(super) fn figures(file: &Table<'_>) -> Many<Vec<PlannedFigure>> {
     const EXPECTED: &str = "a table of names and figures, e.g. [figures] peak_current = \"peak 4 current\"";
     let Some(field) = file.get("figures") else { return Ok(Vec::new()) };
     let table = field.table("the figures", EXPECTED).map_err(single)?;
     table.fields().map(|field| figure(&field).map_err(single)).collect()
 }
 
-fn figure(field: &Field<'_>) -> Result<Figure, Problem> {
+fn figure(field: &Field<'_>) -> Result<PlannedFigure, Problem> {
     const EXPECTED: &str = "min, max, mean, peak or last and a signal, e.g. \"max 4 velocity\", \"last body base x_m\"; or \"time NAME\" of a step or host";
     let words = field.words(EXPECTED)?;
     let words: Vec<&str> = words.split_whitespace().collect();
@@ -310,5 +310,5 @@ fn figure(field: &Field<'_>) -> Result<Figure, Problem> {
         }
         _ => return Err(field.wrong(EXPECTED)),
     };
-    Ok(Figure { name, of, place: field.problem("").locate(field.source_text()) })
+    Ok(PlannedFigure { name, of, place: field.problem("").locate(field.source_text()) })
 }

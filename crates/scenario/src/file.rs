@@ -11,7 +11,7 @@ use sim::Place;
 use super::command::Command;
 use super::condition::Condition;
 use super::entries::{MOST, Many, bounded, entries, expect, figures, host, kept, single, step};
-use super::plan::{Act, Base, Expect, Figure, Host, HostLine, Measure, Paths, ScenarioStep, Sheets};
+use super::plan::{Act, Base, Expect, Host, HostLine, Measure, Paths, PlannedFigure, ScenarioStep, Sheets};
 use crate::sweep::file::{SweepAxis, axes};
 use machine::file::Machine;
 use sim::Fidelity;
@@ -65,7 +65,7 @@ pub struct Scenario {
     pub(super) steps: Vec<ScenarioStep>,
     pub(super) hosts: Vec<Host>,
     pub(super) expects: Vec<Expect>,
-    pub(super) figures: Vec<Figure>,
+    pub(super) figures: Vec<PlannedFigure>,
     text: String,
     /// The text of the machine file that it names; empty where its machine stands in it.
     machine_text: String,

@@ -122,7 +122,7 @@ pub(super) enum Until {
 
 /// A number that a run reports.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Figure {
+pub(super) struct PlannedFigure {
     pub(super) name: String,
     pub(super) of: Measure,
     pub(super) place: Located,

@@ -10,7 +10,7 @@ use super::condition::{View, of_body};
 use super::file::Scenario;
 use super::occurrence::Occurrence;
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{Act, Base, Expect, Figure, Law, Measure, ScenarioStep, Statistic, Until};
+use super::plan::{Act, Base, Expect, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until};
 
 /// The state of everything that is not a host.
 pub(super) struct Script {
@@ -275,7 +275,7 @@ impl Script {
     }
 
     fn measure(&mut self, scenario: &Scenario, world: &mut World) {
-        for (tally, Figure { of, .. }) in self.figures.iter_mut().zip(&scenario.figures) {
+        for (tally, PlannedFigure { of, .. }) in self.figures.iter_mut().zip(&scenario.figures) {
             let (statistic, place, signal) = match of {
                 Measure::Time(_) => continue,
                 Measure::Body(statistic, name, signal) => {
@@ -296,7 +296,7 @@ impl Script {
 
     /// The figures as they stand.
     pub(super) fn figures(&self, scenario: &Scenario) -> Vec<(String, f64)> {
-        let value = |(tally, figure): (&Tally, &Figure)| match &figure.of {
+        let value = |(tally, figure): (&Tally, &PlannedFigure)| match &figure.of {
             Measure::Signal(..) | Measure::Body(..) => tally.value,
             Measure::Time(name) => self.done_at(name).map_or(f64::NAN, |at| at.as_nanos() as f64 / 1e9),
         };

@@ -19,7 +19,7 @@ use super::error::Error;
 use super::expect::Expect;
 use super::row::Row;
 use super::set_points::{Axis, SetPoints};
-use plot::{Event, EventKind};
+use plot::{EventKind, PlotEvent};
 
 /// Called for each section as it begins.
 pub(super) type Progress = Rc<dyn Fn(&str)>;
@@ -54,7 +54,7 @@ pub(super) struct Bench {
     progress: Progress,
     rows: Vec<Row>,
     sections: Vec<(Instant, String, String)>,
-    events: Vec<Event>,
+    events: Vec<PlotEvent>,
     set_points: SetPoints,
     starts: Vec<Start>,
     cuts: Vec<(Instant, Instant)>,
@@ -96,7 +96,7 @@ pub(super) struct Finished {
     pub(super) recorder: Recorder,
     /// Begin, number and name of each section.
     pub(super) sections: Vec<(Instant, String, String)>,
-    pub(super) events: Vec<Event>,
+    pub(super) events: Vec<PlotEvent>,
     pub(super) set_points: SetPoints,
     pub(super) starts: Vec<Start>,
     /// Spans in which there is nothing to see.
@@ -196,7 +196,7 @@ impl Bench {
     /// Marks the present moment in the picture.
     pub(super) fn mark(&mut self, label: impl Into<String>, kind: EventKind) {
         let at_s = self.world.now().as_secs_f64();
-        self.events.push(Event { at_s, label: label.into(), kind });
+        self.events.push(PlotEvent { at_s, label: label.into(), kind });
     }
 
     /// Begins a row without a datagram.

@@ -9,7 +9,7 @@ use plant::coupled::{ArmModel, Body, CommonShaftData, CommonShaftModel, External
 use plant::coupled::{DifferentialDriveData, DifferentialDriveModel};
 use serde::Serialize;
 
-use crate::machine::Quantity;
+use crate::machine::QuantityRange;
 use crate::refused::Refused;
 use crate::stimulus::{BodyStimulus, Place};
 
@@ -177,39 +177,43 @@ impl BodyKind {
     }
 }
 
-const MASS: Quantity = Quantity { what: "mass of a body", expected: "0.01 to 100000 kg", least: 0.01, greatest: 1e5 };
-const YAW_INERTIA: Quantity =
-    Quantity { what: "yaw inertia", expected: "1e-6 to 1e6 kg·m²", least: 1e-6, greatest: 1e6 };
-const LENGTH: Quantity =
-    Quantity { what: "wheel base or wheel radius", expected: "0.001 to 100 m", least: 1e-3, greatest: 100.0 };
-const ROLLING: Quantity =
-    Quantity { what: "rolling resistance", expected: "0 to 1 of the weight", least: 0.0, greatest: 1.0 };
-const GRIP: Quantity = Quantity { what: "grip", expected: "0.001 to 10 of the weight", least: 1e-3, greatest: 10.0 };
-const SHARE: Quantity =
-    Quantity { what: "share of the weight on the wheels", expected: "0.01 to 1", least: 0.01, greatest: 1.0 };
-const SLOPE: Quantity = Quantity { what: "slope", expected: "-80 to 80 degrees", least: -80.0, greatest: 80.0 };
-const UPHILL: Quantity =
-    Quantity { what: "direction uphill", expected: "-360 to 360 degrees", least: -360.0, greatest: 360.0 };
-const PAYLOAD: Quantity = Quantity { what: "payload", expected: "0 to 100000 kg", least: 0.0, greatest: 1e5 };
-const SHAFT: Quantity = Quantity {
+const MASS: QuantityRange =
+    QuantityRange { what: "mass of a body", expected: "0.01 to 100000 kg", least: 0.01, greatest: 1e5 };
+const YAW_INERTIA: QuantityRange =
+    QuantityRange { what: "yaw inertia", expected: "1e-6 to 1e6 kg·m²", least: 1e-6, greatest: 1e6 };
+const LENGTH: QuantityRange =
+    QuantityRange { what: "wheel base or wheel radius", expected: "0.001 to 100 m", least: 1e-3, greatest: 100.0 };
+const ROLLING: QuantityRange =
+    QuantityRange { what: "rolling resistance", expected: "0 to 1 of the weight", least: 0.0, greatest: 1.0 };
+const GRIP: QuantityRange =
+    QuantityRange { what: "grip", expected: "0.001 to 10 of the weight", least: 1e-3, greatest: 10.0 };
+const SHARE: QuantityRange =
+    QuantityRange { what: "share of the weight on the wheels", expected: "0.01 to 1", least: 0.01, greatest: 1.0 };
+const SLOPE: QuantityRange =
+    QuantityRange { what: "slope", expected: "-80 to 80 degrees", least: -80.0, greatest: 80.0 };
+const UPHILL: QuantityRange =
+    QuantityRange { what: "direction uphill", expected: "-360 to 360 degrees", least: -360.0, greatest: 360.0 };
+const PAYLOAD: QuantityRange = QuantityRange { what: "payload", expected: "0 to 100000 kg", least: 0.0, greatest: 1e5 };
+const SHAFT: QuantityRange = QuantityRange {
     what: "inertia or friction of the shaft",
     expected: "0 to 1e6 kg·m², N·m or N·m·s/rad",
     least: 0.0,
     greatest: 1e6,
 };
-const LINK_MASS: Quantity = Quantity { what: "mass of a link", expected: "0 to 100000 kg", least: 0.0, greatest: 1e5 };
-const LINK_INERTIA: Quantity =
-    Quantity { what: "inertia of a link", expected: "0 to 1e6 kg·m²", least: 0.0, greatest: 1e6 };
-const LINK_LENGTH: Quantity =
-    Quantity { what: "length at a link", expected: "-100 to 100 m", least: -100.0, greatest: 100.0 };
-const LINK_ANGLE: Quantity =
-    Quantity { what: "first angle of a joint", expected: "-360 to 360 degrees", least: -360.0, greatest: 360.0 };
+const LINK_MASS: QuantityRange =
+    QuantityRange { what: "mass of a link", expected: "0 to 100000 kg", least: 0.0, greatest: 1e5 };
+const LINK_INERTIA: QuantityRange =
+    QuantityRange { what: "inertia of a link", expected: "0 to 1e6 kg·m²", least: 0.0, greatest: 1e6 };
+const LINK_LENGTH: QuantityRange =
+    QuantityRange { what: "length at a link", expected: "-100 to 100 m", least: -100.0, greatest: 100.0 };
+const LINK_ANGLE: QuantityRange =
+    QuantityRange { what: "first angle of a joint", expected: "-360 to 360 degrees", least: -360.0, greatest: 360.0 };
 /// Beyond that an angle in rad has no room for a step of an encoder.
-pub(crate) const JOINT_ANGLE: Quantity =
-    Quantity { what: "angle of a joint", expected: "-1e6 to 1e6 rad", least: -1e6, greatest: 1e6 };
-const LINK_AXIS: Quantity =
-    Quantity { what: "length of a joint's axis", expected: "1", least: 1.0 - 1e-6, greatest: 1.0 + 1e-6 };
-const TURNS: Quantity = Quantity {
+pub(crate) const JOINT_ANGLE: QuantityRange =
+    QuantityRange { what: "angle of a joint", expected: "-1e6 to 1e6 rad", least: -1e6, greatest: 1e6 };
+const LINK_AXIS: QuantityRange =
+    QuantityRange { what: "length of a joint's axis", expected: "1", least: 1.0 - 1e-6, greatest: 1.0 + 1e-6 };
+const TURNS: QuantityRange = QuantityRange {
     what: "turns of the body's shaft per turn of the drive's, without its sign,",
     expected: "0.0001 to 1000",
     least: 1e-4,
@@ -254,7 +258,7 @@ impl Coupling {
     }
 }
 
-fn all(quantity: &Quantity, values: &[f64]) -> Result<(), Refused> {
+fn all(quantity: &QuantityRange, values: &[f64]) -> Result<(), Refused> {
     values.iter().try_for_each(|value| quantity.check(*value).map(|_| ()))
 }
 

@@ -1,6 +1,6 @@
 //! A Bode plot: magnitude, phase and coherence over the logarithm of the frequency.
 
-use plot::{Colour, Event, EventKind, Figure, Panel, Style, Trace};
+use plot::{Colour, EventKind, Figure, Panel, PlotEvent, Style, Trace};
 
 use crate::mechanics::Mechanics;
 use crate::response::{Line, Response};
@@ -45,8 +45,11 @@ pub fn bode(title: &str, response: &Response, model: Option<&Mechanics>) -> Figu
         traces,
     };
     let coherence = Panel { height: 60.0, with_zero: true, ..panel("coherence", "", vec![coherence]) };
-    let mark =
-        |hz: f64, label: &str| Event { at_s: hz.log10(), label: format!("{label} {hz:.1} Hz"), kind: EventKind::Note };
+    let mark = |hz: f64, label: &str| PlotEvent {
+        at_s: hz.log10(),
+        label: format!("{label} {hz:.1} Hz"),
+        kind: EventKind::Note,
+    };
     let events = model.and_then(|model| model.elastic).map_or(Vec::new(), |elastic| {
         vec![mark(elastic.anti_resonance_hz, "anti-resonance"), mark(elastic.resonance_hz, "resonance")]
     });

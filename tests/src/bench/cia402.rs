@@ -8,7 +8,7 @@ use devices::servo::CIA402;
 use sim::Component;
 use sim::machine::{Order, ServoMachine, servo};
 
-use super::{Rows, Subject};
+use super::{BenchSubject, Rows};
 use crate::cia402::{objects, power_states};
 use crate::manual::PowerCell;
 use crate::power_states::PowerSubject;
@@ -32,7 +32,7 @@ pub type Drive = Cia402;
 /// Its bench.
 pub type Bench = super::Bench<Cia402>;
 
-impl Subject for Cia402 {
+impl BenchSubject for Cia402 {
     type Machine = ServoMachine;
 
     const MODEL: &'static str = "cia402";

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use sim::Report;
 
-use super::{Abort, Bench, Place, Subject, head};
+use super::{Abort, Bench, BenchSubject, ObjectAddress, head};
 
-impl<S: Subject> Bench<S> {
+impl<S: BenchSubject> Bench<S> {
     /// Asserts that this and nothing else was heard since the last call; `n` stands for the node.
     #[track_caller]
     pub fn hears(&mut self, expected: &[&str]) -> &mut Self {
@@ -23,7 +23,7 @@ impl<S: Subject> Bench<S> {
 
     /// Asserts that an object reads this value now.
     #[track_caller]
-    pub fn reads(&mut self, object: impl Place, expected: i64) -> &mut Self {
+    pub fn reads(&mut self, object: impl ObjectAddress, expected: i64) -> &mut Self {
         let (value, (index, sub)) = (self.get(object), object.place());
         let at = self.seconds();
         assert_eq!(value, expected, "{index:04X}h:{sub:02X} is {value:X}h, expected {expected:X}h, at {at} s");
@@ -48,7 +48,7 @@ impl<S: Subject> Bench<S> {
 
     /// Asserts that a write is refused with this code.
     #[track_caller]
-    pub fn refuses(&mut self, object: impl Place, value: i64, code: Abort) -> &mut Self {
+    pub fn refuses(&mut self, object: impl ObjectAddress, value: i64, code: Abort) -> &mut Self {
         let (answer, (index, sub)) = (self.write(object, value), object.place());
         assert_eq!(answer, Err(code), "{index:04X}h:{sub:02X} = {value:X}h: {answer:08X?}, expected {code:08X}h");
         self

@@ -3,9 +3,9 @@
 use can::Instant;
 use sim::{Component, Report, VirtualDrive};
 
-use super::{Bench, Subject};
+use super::{Bench, BenchSubject};
 
-impl<S: Subject> Bench<S> {
+impl<S: BenchSubject> Bench<S> {
     /// Does something to the drive, as a person beside the machine.
     pub fn operate<T>(&mut self, act: impl FnOnce(&mut dyn VirtualDrive, Instant) -> T) -> T {
         if !self.bare {

@@ -9,7 +9,7 @@ use drives::mjoint::{Model, storage};
 use sim::VirtualDrive;
 use sim::machine::{Joint, MJointMachine, Machine, mjoint};
 
-use super::{Place, Rows, Subject};
+use super::{BenchSubject, ObjectAddress, Rows};
 use crate::mjoint::{figures, objects};
 
 pub use super::{Abort, assert_within, head};
@@ -40,7 +40,7 @@ pub type Drive = MJoint;
 /// Its bench.
 pub type Bench = super::Bench<MJoint>;
 
-impl Subject for MJoint {
+impl BenchSubject for MJoint {
     type Machine = MJointMachine;
 
     const MODEL: &'static str = "m4230e17b50";
@@ -80,13 +80,13 @@ impl Bench {
     }
 
     /// Writes to another joint than the first.
-    pub fn write_to(&mut self, node: u8, object: impl Place, value: i64) -> Result<(), Abort> {
+    pub fn write_to(&mut self, node: u8, object: impl ObjectAddress, value: i64) -> Result<(), Abort> {
         self.at(node, |bench| bench.write(object, value))
     }
 
     /// Reads from another joint than the first.
     #[track_caller]
-    pub fn get_from(&mut self, node: u8, object: impl Place) -> i64 {
+    pub fn get_from(&mut self, node: u8, object: impl ObjectAddress) -> i64 {
         self.at(node, |bench| bench.get(object))
     }
 

@@ -1,7 +1,7 @@
 //! A virtual drive, a host and the bus between them: the table that the tests of every drive work at.
 //!
 //! The host speaks CANopen by the bytes, with the widths and signs of the manual's object table, so that nothing of the
-//! drive's own tables judges the drive. A [`Subject`] says which drive it is; `bench::DRIVE` has that drive's own handles.
+//! drive's own tables judges the drive. A [`BenchSubject`] says which drive it is; `bench::DRIVE` has that drive's own handles.
 
 pub mod cia402;
 mod expectations;
@@ -24,7 +24,7 @@ use sim::{StationId, VirtualDrive, World};
 use crate::manual::ObjectRow;
 
 pub use expectations::assert_within;
-pub use objects::{Abort, Place, head};
+pub use objects::{Abort, ObjectAddress, head};
 
 /// A drive answers within about 1 ms; its users wait for 20 ms.
 const ANSWER_WITHIN: Duration = Duration::from_millis(20);
@@ -36,7 +36,7 @@ const LOOK_EVERY_BITS: u64 = 50;
 const SEND_BITS: u64 = 500;
 
 /// A drive that is tested, as it is delivered.
-pub trait Subject: 'static {
+pub trait BenchSubject: 'static {
     /// Firmware and physics.
     type Machine: VirtualDrive + Clone + 'static;
 
@@ -110,14 +110,14 @@ pub struct Bench<S> {
     subject: PhantomData<S>,
 }
 
-impl<S: Subject> Default for Bench<S> {
+impl<S: BenchSubject> Default for Bench<S> {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// What holds for any drive. Panics where a test is wrong, and where a drive does not do what a helper takes for granted.
-impl<S: Subject> Bench<S> {
+impl<S: BenchSubject> Bench<S> {
     /// A drive as delivered that has just booted.
     #[must_use]
     pub fn new() -> Self {
@@ -268,6 +268,6 @@ pub fn boot_up_of(drive: impl VirtualDrive + 'static, bitrate: Bitrate) -> Optio
 }
 
 /// The time of so many bits on the subject's bus.
-fn bits<S: Subject>(count: u64) -> Duration {
+fn bits<S: BenchSubject>(count: u64) -> Duration {
     Duration::from_nanos(count * S::BITRATE.bit_nanos())
 }

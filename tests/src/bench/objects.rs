@@ -2,7 +2,7 @@
 
 use can::{CanId, Frame};
 
-use super::{Bench, Subject};
+use super::{Bench, BenchSubject};
 
 /// Bit 31 of a PDO's COB-ID: it is off.
 const INVALID: i64 = 1 << 31;
@@ -11,25 +11,25 @@ const INVALID: i64 = 1 << 31;
 pub type Abort = u32;
 
 /// Where an object stands: its index, or its index and its sub-index.
-pub trait Place: Copy {
+pub trait ObjectAddress: Copy {
     /// Index and sub-index.
     fn place(self) -> (u16, u8);
 }
 
-impl Place for u16 {
+impl ObjectAddress for u16 {
     fn place(self) -> (u16, u8) {
         (self, 0)
     }
 }
 
-impl Place for (u16, u8) {
+impl ObjectAddress for (u16, u8) {
     fn place(self) -> (u16, u8) {
         self
     }
 }
 
 /// Panics where a test is wrong, and where a drive does not do what a helper takes for granted.
-impl<S: Subject> Bench<S> {
+impl<S: BenchSubject> Bench<S> {
     /// Sends an SDO request; the eight bytes that answer it, or `None`.
     pub fn sdo(&mut self, request: &[u8]) -> Option<[u8; 8]> {
         let node = u16::from(self.node);
@@ -38,7 +38,7 @@ impl<S: Subject> Bench<S> {
     }
 
     /// Writes `value` with the object's width; four bytes for one that the manual does not have.
-    pub fn write(&mut self, object: impl Place, value: i64) -> Result<(), Abort> {
+    pub fn write(&mut self, object: impl ObjectAddress, value: i64) -> Result<(), Abort> {
         let (index, sub) = object.place();
         let size = S::rows().find(index, sub).map_or(4, |row| row.size);
         let mut request = head(0x23 | (4 - size as u8) << 2, index, sub);
@@ -52,7 +52,7 @@ impl<S: Subject> Bench<S> {
 
     /// Writes a value that the drive must take.
     #[track_caller]
-    pub fn set(&mut self, object: impl Place, value: i64) -> &mut Self {
+    pub fn set(&mut self, object: impl ObjectAddress, value: i64) -> &mut Self {
         let (index, sub) = object.place();
         let done = self.write(object, value);
         assert_eq!(done, Ok(()), "{index:04X}h:{sub:02X} = {value} at {} s", self.seconds());
@@ -60,7 +60,7 @@ impl<S: Subject> Bench<S> {
     }
 
     /// The bytes of an object, as many as the drive sends.
-    pub fn read(&mut self, object: impl Place) -> Result<Vec<u8>, Abort> {
+    pub fn read(&mut self, object: impl ObjectAddress) -> Result<Vec<u8>, Abort> {
         let (index, sub) = object.place();
         let answer = self.sdo(&head(0x40, index, sub));
         let answer = answer.unwrap_or_else(|| panic!("no answer to a read of {index:04X}h:{sub:02X}"));
@@ -72,7 +72,7 @@ impl<S: Subject> Bench<S> {
 
     /// The value of an object, with the sign that its type has.
     #[track_caller]
-    pub fn get(&mut self, object: impl Place) -> i64 {
+    pub fn get(&mut self, object: impl ObjectAddress) -> i64 {
         let (index, sub) = object.place();
         let bytes = self.read(object).unwrap_or_else(|abort| panic!("{index:04X}h:{sub:02X}: {abort:08X}h"));
         value_of(&bytes, S::rows().find(index, sub).is_some_and(|row| row.signed))

@@ -7,7 +7,7 @@ use plant::hub_motor::HubMotor;
 use sim::Component;
 use sim::machine::{Zlac8030lMachine, zlac8030l};
 
-use super::{Rows, Subject};
+use super::{BenchSubject, Rows};
 use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::{PowerSubject, ZltechSubject};
 use crate::zlac8030l::{PowerCell, objects, power_states};
@@ -30,7 +30,7 @@ pub type Drive = Zlac8030l;
 /// Its bench.
 pub type Bench = super::Bench<Zlac8030l>;
 
-impl Subject for Zlac8030l {
+impl BenchSubject for Zlac8030l {
     type Machine = Zlac8030lMachine;
 
     const MODEL: &'static str = "zlac8030l";

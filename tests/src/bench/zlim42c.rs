@@ -6,7 +6,7 @@ use can::Bitrate;
 use sim::Component;
 use sim::machine::{Zlim42cMachine, zlim42c, zlim42c_82};
 
-use super::{Rows, Subject};
+use super::{BenchSubject, Rows};
 use crate::manual::PowerCell;
 use crate::object_rows::{KeepingSubject, Memory};
 use crate::power_states::{PowerSubject, ZltechSubject};
@@ -30,7 +30,7 @@ pub type Drive = Zlim42c;
 /// Its bench.
 pub type Bench = super::Bench<Zlim42c>;
 
-impl Subject for Zlim42c {
+impl BenchSubject for Zlim42c {
     type Machine = Zlim42cMachine;
 
     const MODEL: &'static str = "zlim42c";

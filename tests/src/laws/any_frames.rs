@@ -5,7 +5,7 @@ use canopen::AbortCode;
 use canopen::sdo::wire::Reply;
 use drives::{mjoint, zlac8030l, zlim42c};
 
-use super::firmware::Subject;
+use super::firmware::LawSubject;
 use super::selected_frame::selected_frame;
 
 /// A chunk is a selector, a length and eight bytes, see [`selected_frame`], one byte for how long it lasts, see [`wait`],
@@ -63,7 +63,7 @@ pub(super) fn mjoint(data: &[u8]) {
 
 /// Every SDO request gets at most one well-formed answer, every writable object lies within its limits, read-only
 /// communication objects do not change, what the drive reports is finite, and the duty cycles are shares.
-fn drive<F: Subject>(data: &[u8], mut firmware: F, hardware: &F::Hardware) {
+fn drive<F: LawSubject>(data: &[u8], mut firmware: F, hardware: &F::Hardware) {
     let mut now = Instant::ZERO;
     firmware.power_on(hardware, now);
     let first = fixed(&firmware);
@@ -97,7 +97,7 @@ fn wait(byte: u8, period_ns: u64) -> (u8, u64) {
 }
 
 /// Takes what is sent: SDO answers are counted, and all is of the form that CiA 301 gives it.
-fn drain<F: Subject>(firmware: &mut F, after: &Frame) -> usize {
+fn drain<F: LawSubject>(firmware: &mut F, after: &Frame) -> usize {
     let mut answers = 0;
     for count in 0.. {
         assert!(count < 64, "it never stops sending after {after}");
@@ -117,13 +117,13 @@ fn drain<F: Subject>(firmware: &mut F, after: &Frame) -> usize {
 }
 
 /// Communication objects that can only be read, but for the error register.
-fn fixed<F: Subject>(firmware: &F) -> Vec<i64> {
+fn fixed<F: LawSubject>(firmware: &F) -> Vec<i64> {
     let rows = F::table().iter();
     let rows = rows.filter(|(_, row)| row.index < 0x2000 && row.index != 0x1001 && !row.access.is_writable());
     rows.map(|(slot, _)| firmware.value(slot)).collect()
 }
 
-fn judge<F: Subject>(firmware: &F, first: &[i64], frame: &Frame) {
+fn judge<F: LawSubject>(firmware: &F, first: &[i64], frame: &Frame) {
     let ruled = |index| !F::OWN_RULE.contains(&index);
     for (slot, row) in F::table().iter().filter(|(_, row)| row.access.is_writable() && ruled(row.index)) {
         let value = firmware.value(slot);

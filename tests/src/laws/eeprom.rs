@@ -5,7 +5,7 @@ use canopen::sdo::wire::Reply;
 use drives::engine::storage::{BANK_SIZE, IMAGE_SIZE, StoredImage};
 use drives::{mjoint, zlac8030l, zlim42c};
 
-use super::firmware::Subject;
+use super::firmware::LawSubject;
 
 /// A selector (the drive in its low digits, what the image is above), then bytes for the damage.
 pub(super) const SAMPLES: &[&[u8]] = &[
@@ -93,7 +93,7 @@ fn bank(records: &[u8]) -> [u8; BANK_SIZE] {
     bank
 }
 
-fn boots<F: Subject>(mut firmware: F, hardware: &F::Hardware) {
+fn boots<F: LawSubject>(mut firmware: F, hardware: &F::Hardware) {
     let mut now = Instant::ZERO;
     firmware.power_on(hardware, now);
     for _ in 0..PERIODS {
@@ -112,7 +112,7 @@ fn boots<F: Subject>(mut firmware: F, hardware: &F::Hardware) {
 }
 
 /// An upload of 1000h is answered with the object, whatever address the image gave it.
-fn answers<F: Subject>(firmware: &mut F, mut now: Instant) {
+fn answers<F: LawSubject>(firmware: &mut F, mut now: Instant) {
     let node = u16::from(firmware.report(devices::AxisId::FIRST).node_id.raw());
     firmware.handle_frame(&Frame::new(CanId::standard(0x600 + node), &[0x40, 0, 0x10, 0, 0, 0, 0, 0]), now);
     // A device may take its time.

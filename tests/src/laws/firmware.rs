@@ -4,7 +4,7 @@ use canopen::od::{Slot, Table};
 use drives::{Firmware, mjoint, zlac8030l, zlim42c};
 
 /// A drive's firmware, and what differs between drives.
-pub(super) trait Subject: Firmware<Sensors: Default> {
+pub(super) trait LawSubject: Firmware<Sensors: Default> {
     /// What a selector of a frame picks, SDO first.
     const IDS: [u16; 8];
     /// Writable objects that do not keep to the limits of their row, see [`keeps_its_own_rules`](Self::keeps_its_own_rules).
@@ -33,7 +33,7 @@ fn are_shares(duty: &[f32]) -> bool {
     duty.iter().all(|share| (0.0..=1.0).contains(share))
 }
 
-impl Subject for zlac8030l::Zlac8030l {
+impl LawSubject for zlac8030l::Zlac8030l {
     const IDS: [u16; 8] = ZL_IDS;
 
     fn table() -> &'static Table {
@@ -74,7 +74,7 @@ impl Subject for zlac8030l::Zlac8030l {
 }
 
 // 200Bh locks the shaft at power-on.
-impl Subject for zlim42c::Zlim42c {
+impl LawSubject for zlim42c::Zlim42c {
     const IDS: [u16; 8] = ZL_IDS;
 
     fn table() -> &'static Table {
@@ -107,7 +107,7 @@ impl Subject for zlim42c::Zlim42c {
 }
 
 // Pulse mode enables by itself.
-impl Subject for mjoint::MJoint {
+impl LawSubject for mjoint::MJoint {
     /// SDO, the four RPDOs, SYNC, the host's heartbeat, NMT.
     const IDS: [u16; 8] = [0x601, 0x201, 0x301, 0x401, 0x501, 0x080, 0x77F, 0x000];
     /// The save flag reads 2 when all is stored, which cannot be written.

@@ -43,7 +43,7 @@ pub(super) fn candump_line(data: &[u8]) {
 /// socketcand in both directions.
 pub(super) fn socketcand(data: &[u8]) {
     decoder_laws(data, socketcand_decoder::<socketcand::Request>, socketcand::Message::emit, |request| request);
-    decoder_laws(data, socketcand_decoder::<socketcand::Reply>, socketcand::Message::emit, as_written);
+    decoder_laws(data, socketcand_decoder::<socketcand::ServerReply>, socketcand::Message::emit, as_written);
 }
 
 /// slcan in both directions.
@@ -53,14 +53,14 @@ pub(super) fn slcan(data: &[u8]) {
 }
 
 /// Time stamps are written in whole microseconds, words without control characters. Others may send more.
-fn as_written(reply: socketcand::Reply) -> socketcand::Reply {
+fn as_written(reply: socketcand::ServerReply) -> socketcand::ServerReply {
     match reply {
-        socketcand::Reply::Frame { at, frame } => {
-            socketcand::Reply::Frame { at: Instant::from_nanos(at.as_nanos() / 1_000 * 1_000), frame }
+        socketcand::ServerReply::Frame { at, frame } => {
+            socketcand::ServerReply::Frame { at: Instant::from_nanos(at.as_nanos() / 1_000 * 1_000), frame }
         }
-        socketcand::Reply::Error(words) => {
+        socketcand::ServerReply::Error(words) => {
             let printable: String = words.chars().filter(|char| !char.is_ascii_control()).collect();
-            socketcand::Reply::Error(printable.trim().to_owned())
+            socketcand::ServerReply::Error(printable.trim().to_owned())
         }
         other => other,
     }

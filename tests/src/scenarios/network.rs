@@ -1,10 +1,10 @@
 //! NMT, heartbeat, EMCY and SYNC (CiA 301), with the faults that other CANopen stacks were found to have.
 
-use crate::bench::{Bench, Subject, assert_within};
+use crate::bench::{Bench, BenchSubject, assert_within};
 use crate::power_states::PowerSubject;
 
 /// 7.2.8.2: node 0 is all nodes; a command that is cut short or not defined has no effect.
-pub fn commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not<S: Subject>() {
+pub fn commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 20);
     for (command, state) in [
@@ -27,7 +27,7 @@ pub fn commands_to_all_nodes_and_to_this_one_act_and_commands_to_others_do_not<S
 }
 
 /// What is stored of communication works at once after a reset: 1017h with the boot-up message as its first, and RPDO1.
-pub fn a_reset_leaves_the_node_able_to_speak<S: Subject>() {
+pub fn a_reset_leaves_the_node_able_to_speak<S: BenchSubject>() {
     for (command, name) in [("000#810n", "node"), ("000#820n", "communication")] {
         for state in ["000#010n", "000#020n"] {
             let mut bench = Bench::<S>::new();
@@ -70,14 +70,14 @@ pub fn a_communication_reset_leaves_the_motor_turning_and_a_node_reset_frees_it<
 }
 
 /// 1017h is stored.
-pub fn the_heartbeat_comes_back_by_itself_after_a_power_cycle<S: Subject>() {
+pub fn the_heartbeat_comes_back_by_itself_after_a_power_cycle<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 200).let_store().forget().power_cycle().run_ms(700);
     bench.hears_of("70n#", &["70n#00", "70n#7F", "70n#7F", "70n#7F"]);
 }
 
 /// 7.2.8.3.2.2, and 0 ms for none.
-pub fn a_heartbeat_of_100_ms_comes_a_hundred_times_in_ten_seconds_without_drift_and_one_of_0_never<S: Subject>() {
+pub fn a_heartbeat_of_100_ms_comes_a_hundred_times_in_ten_seconds_without_drift_and_one_of_0_never<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 100).run_ms(150).forget().run_ms(10_000);
     let times: Vec<_> = bench.heard_at().iter().map(|(at, _)| at.as_nanos()).collect();
@@ -105,7 +105,7 @@ pub fn no_emcy_and_no_pdo_leave_a_stopped_node<S: PowerSubject>() {
 }
 
 /// 7.5.2.5.
-pub fn sync_is_heard_on_the_identifier_of_1005h<S: Subject>() {
+pub fn sync_is_heard_on_the_identifier_of_1005h<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.map(0x1A00, &[0x6041_0010]).set((0x1800, 2), 1).set(0x1005, 0x90).send("000#010n").run_ms(5).forget();
     for (frame, answers) in [("080#", 0), ("090#", 1)] {
@@ -116,7 +116,7 @@ pub fn sync_is_heard_on_the_identifier_of_1005h<S: Subject>() {
 
 /// Services that no manual names: node guarding, LSS (switch state global, fastscan), TIME, a second SDO channel, SDO of
 /// another node.
-pub fn nothing_that_the_manual_does_not_name_is_answered<S: Subject>() {
+pub fn nothing_that_the_manual_does_not_name_is_answered<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.set(0x1017, 0).run_ms(20).forget();
     for frame in [
@@ -133,7 +133,7 @@ pub fn nothing_that_the_manual_does_not_name_is_answered<S: Subject>() {
 
 /// Bit 30 of a TPDO's COB-ID is 0: CiA 301, table 69 reads that as "RTR allowed". CiA says elsewhere (application note 802)
 /// that remote frames should not be used, and these drives do not hear them.
-pub fn remote_frames_get_no_answer_though_the_cob_ids_say_that_rtr_is_allowed<S: Subject>() {
+pub fn remote_frames_get_no_answer_though_the_cob_ids_say_that_rtr_is_allowed<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     if S::rows().find(0x1A00, 0).is_some_and(|row| row.writable) {
         bench.map(0x1A00, &[0x6041_0010]);

@@ -1,6 +1,6 @@
 //! PDOs that can be mapped (CiA 301, 7.2.2 and 7.5.2.35 and on): when they act, what they carry, and which are refused.
 
-use crate::bench::{Bench, Subject, assert_within};
+use crate::bench::{Bench, BenchSubject, assert_within};
 use crate::power_states::PowerSubject;
 
 const CANNOT_BE_MAPPED: u32 = 0x0604_0041;
@@ -10,19 +10,19 @@ const NO_SUCH_SUB_INDEX: u32 = 0x0609_0011;
 const INVALID_VALUE: u32 = 0x0609_0030;
 
 /// 60FFh in RPDO1 (the second), the node started, as 6.2 of the ZLAC8030L's manual does.
-fn with_velocity_rpdo<S: Subject>() -> Bench<S> {
+fn with_velocity_rpdo<S: BenchSubject>() -> Bench<S> {
     let mut bench = Bench::new();
     bench.map(0x1601, &[0x60FF_0020]).send("000#010n").forget();
     bench
 }
 
 /// Sends SYNC and waits until what it causes has gone over the bus.
-fn sync<S: Subject>(bench: &mut Bench<S>) {
+fn sync<S: BenchSubject>(bench: &mut Bench<S>) {
     bench.send("080#").run_ms(2);
 }
 
 /// 7.3.2.2: not in pre-operational, not when stopped, and not later either.
-pub fn an_rpdo_acts_in_operational_only<S: Subject>() {
+pub fn an_rpdo_acts_in_operational_only<S: BenchSubject>() {
     let mut bench = with_velocity_rpdo::<S>();
     for state in ["000#800n", "000#020n"] {
         bench.send(state).send("30n#64000000").send("000#010n").run_ms(10).reads(0x60FF, 0);
@@ -31,7 +31,7 @@ pub fn an_rpdo_acts_in_operational_only<S: Subject>() {
 }
 
 /// Two objects in each: 6083h/6084h, 6081h/6040h, 60FFh/6085h, 607Ah/6060h.
-pub fn each_of_the_four_rpdos_sets_the_objects_it_maps<S: Subject>() {
+pub fn each_of_the_four_rpdos_sets_the_objects_it_maps<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.map(0x1600, &[0x6083_0020, 0x6084_0020]).map(0x1601, &[0x6081_0020, 0x6040_0010]);
     bench.map(0x1602, &[0x60FF_0020, 0x6085_0020]).map(0x1603, &[0x607A_0020, 0x6060_0008]).send("000#010n");
@@ -65,7 +65,7 @@ pub fn each_of_the_four_tpdos_tells_the_objects_it_maps<S: PowerSubject>() {
 }
 
 /// Table 72.
-pub fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_not<S: Subject>() {
+pub fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_not<S: BenchSubject>() {
     for (kind, waits) in [(0, true), (1, true), (240, true), (254, false), (255, false)] {
         let mut bench = with_velocity_rpdo::<S>();
         bench.set((0x1401, 2), kind).send("30n#64000000");
@@ -76,7 +76,7 @@ pub fn an_rpdo_of_types_0_to_240_waits_for_the_sync_and_one_of_254_or_255_does_n
 }
 
 /// Table 77.
-pub fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change<S: Subject>() {
+pub fn a_synchronous_tpdo_comes_with_each_nth_sync_and_one_of_type_0_after_a_change<S: BenchSubject>() {
     for (kind, syncs) in [(1, 12), (3, 9), (4, 12), (240, 480), (0, 12)] {
         let mut bench = Bench::<S>::new();
         bench.map(0x1A02, &[0x6041_0010]).set((0x1802, 2), kind).send("080#").run_ms(2);
@@ -135,7 +135,7 @@ pub fn a_pdo_is_mapped_with_bit_31_as_masters_do_and_without_as_the_manuals_do<S
 }
 
 /// 7.5.2.35, bit 31.
-pub fn a_switched_off_pdo_is_silent_and_deaf<S: Subject>() {
+pub fn a_switched_off_pdo_is_silent_and_deaf<S: BenchSubject>() {
     let mut bench = with_velocity_rpdo::<S>();
     let node = i64::from(S::NODE);
     bench.map(0x1A00, &[0x6041_0010]).set((0x1800, 1), 0x8000_0180 + node).set((0x1401, 1), 0x8000_0300 + node);
@@ -144,7 +144,7 @@ pub fn a_switched_off_pdo_is_silent_and_deaf<S: Subject>() {
 }
 
 /// 605Ah to 605Dh and 1017h are not mappable, 6041h is read-only (object tables); widths, sums and counts are CiA 301's.
-pub fn a_wrong_mapping_is_refused_with_the_codes_of_cia_301<S: Subject>() {
+pub fn a_wrong_mapping_is_refused_with_the_codes_of_cia_301<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     for record in (0x1600..0x1604).chain(0x1A00..0x1A04) {
         bench.set(record, 0);
@@ -165,7 +165,7 @@ pub fn a_wrong_mapping_is_refused_with_the_codes_of_cia_301<S: Subject>() {
 }
 
 /// A mode that does not exist, a speed above its range, a byte too few: the object stays as it is.
-pub fn what_the_table_refuses_an_rpdo_does_not_do_either<S: Subject>() {
+pub fn what_the_table_refuses_an_rpdo_does_not_do_either<S: BenchSubject>() {
     let (_, most_rpm) = S::rows().find(0x60FF, 0).and_then(|row| row.limits).expect("a range");
     let frame = |mode: u8, rpm: i64| format!("30n#{mode:02X}{:08X}", (rpm as u32).swap_bytes());
     let mut bench = Bench::<S>::new();
@@ -176,7 +176,7 @@ pub fn what_the_table_refuses_an_rpdo_does_not_do_either<S: Subject>() {
 }
 
 /// 7.2.2.5: a frame may be longer than what is mapped, not shorter.
-pub fn a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped<S: Subject>() {
+pub fn a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let before = (bench.get(0x6083), bench.get(0x6084));
     bench.map(0x1601, &[0x6083_0020, 0x6084_0020]).send("000#010n").send("30n#64000000C80000");
@@ -186,7 +186,7 @@ pub fn a_short_rpdo_is_not_half_applied_and_a_long_one_counts_as_far_as_mapped<S
 
 /// 7.2.7.1 and table 26: 8210h when the error begins, 0000h when it ends, bit 4 of 1001h between. Of an RPDO that is too
 /// long the mapped bytes count; 8220h is a choice, and none of these drives makes it.
-pub fn an_rpdo_that_is_too_short_is_told_once_by_8210h_and_one_that_is_too_long_is_not<S: Subject>() {
+pub fn an_rpdo_that_is_too_short_is_told_once_by_8210h_and_one_that_is_too_long_is_not<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.send("000#010n").run_ms(50).forget().send("20n#06").send("20n#06").send("20n#06").run_ms(10);
     bench.hears_of("08n#", &["08n#1082110000000000"]).reads(0x1001, 0b1_0001).reads(0x6040, 0).reads(0x603F, 0);
@@ -216,7 +216,7 @@ pub fn a_stored_mapping_works_after_a_power_cycle<S: PowerSubject>() {
 }
 
 /// Tables 72 and 77: 241 to 251 are reserved, 252 and 253 are for remote frames, and of TPDOs only.
-pub fn a_reserved_transmission_type_is_refused<S: Subject>() {
+pub fn a_reserved_transmission_type_is_refused<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     for record in (0x1400..0x1404).chain(0x1800..0x1804) {
         for kind in [0, 1, 240, 254, 255] {

@@ -1,7 +1,7 @@
 //! SDO (CiA 301, 7.2.4): the protocol on the running drive. Which objects there are and what they take is asked row by row
 //! in [`object_rows`](crate::object_rows).
 
-use crate::bench::{Bench, Subject, assert_within, head};
+use crate::bench::{Bench, BenchSubject, assert_within, head};
 use crate::power_states::PowerSubject;
 
 /// Abort code 0504 0001h: command specifier not valid or unknown.
@@ -17,7 +17,7 @@ pub fn malformed_requests_are_survived_and_change_nothing<S: PowerSubject>() {
 }
 
 /// No manual has block transfers, and CiA 301 leaves them open.
-pub fn a_block_transfer_is_refused_and_an_abort_in_its_place_is_ignored<S: Subject>() {
+pub fn a_block_transfer_is_refused_and_an_abort_in_its_place_is_ignored<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let device_type = bench.get(0x1000);
     let mut refused = head(0x80, 0x1000, 0);
@@ -28,7 +28,7 @@ pub fn a_block_transfer_is_refused_and_an_abort_in_its_place_is_ignored<S: Subje
 }
 
 /// Two frames of 0.25 ms at 500 kbit/s are on the wire for it.
-pub fn an_answer_comes_within_about_a_millisecond<S: Subject>() {
+pub fn an_answer_comes_within_about_a_millisecond<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let before = bench.world.now();
     bench.sdo(&head(0x40, 0x6041, 0));
@@ -37,7 +37,7 @@ pub fn an_answer_comes_within_about_a_millisecond<S: Subject>() {
 }
 
 /// 7.2.4.3.3 and on: 1000 as two steps, a byte too many, a byte too few, the wrong toggle bit. 6083h is four bytes long in each drive.
-pub fn a_segmented_download_carries_a_small_object_too<S: Subject>() {
+pub fn a_segmented_download_carries_a_small_object_too<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let begin = [0x21, 0x83, 0x60, 0, 4, 0, 0, 0];
     bench.answers(begin, head(0x60, 0x6083, 0)).answers([0x07, 0xE8, 0x03, 0, 0, 0, 0, 0], [0x20, 0, 0, 0, 0, 0, 0, 0]);
@@ -54,13 +54,13 @@ pub fn a_segmented_download_carries_a_small_object_too<S: Subject>() {
 }
 
 /// Bit 0 of the command is 0: no size is indicated.
-pub fn an_expedited_download_without_a_size_takes_what_the_object_needs<S: Subject>() {
+pub fn an_expedited_download_without_a_size_takes_what_the_object_needs<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     bench.answers([0x22, 0x83, 0x60, 0, 0xE8, 3, 0, 0], head(0x60, 0x6083, 0)).reads(0x6083, 1000);
 }
 
 /// Clients of these drives send 43h and 4Bh for 40h and rely on the answers. 27h: three bytes, which no object here has.
-pub fn an_upload_ignores_its_low_five_bits_and_three_bytes_are_too_few<S: Subject>() {
+pub fn an_upload_ignores_its_low_five_bits_and_three_bytes_are_too_few<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let device_type = bench.sdo(&head(0x40, 0x1000, 0)).expect("an answer");
     assert_eq!(device_type[0], 0x43);
@@ -72,7 +72,7 @@ pub fn an_upload_ignores_its_low_five_bits_and_three_bytes_are_too_few<S: Subjec
 }
 
 /// An answer repeats the multiplexor of its request; the next request is sent without waiting for it here.
-pub fn requests_sent_without_waiting_for_answers_are_all_answered_in_order<S: Subject>() {
+pub fn requests_sent_without_waiting_for_answers_are_all_answered_in_order<S: BenchSubject>() {
     let mut bench = Bench::<S>::new();
     let requests = ["60n#4000100000000000", "60n#4041600000000000", "60n#4064600000000000", "60n#4060600000000000"];
     let answers: Vec<String> =

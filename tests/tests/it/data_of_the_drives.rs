@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use ferrodrive_tests::bench::Subject;
+use ferrodrive_tests::bench::BenchSubject;
 use ferrodrive_tests::bench::cia402::Cia402;
 use ferrodrive_tests::bench::mjoint::MJoint;
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;

@@ -5,13 +5,13 @@
 
 use canopen::Mux;
 use devices::{all, model};
-use ferrodrive_tests::bench::{Abort, Bench, Subject, mjoint, zlac8030l, zlim42c};
-use ferrodrive_tests::csv::Table;
+use ferrodrive_tests::bench::{Abort, Bench, BenchSubject, mjoint, zlac8030l, zlim42c};
+use ferrodrive_tests::csv::CsvTable;
 
 const NO_SUCH_OBJECT: Abort = 0x0602_0000;
 
 /// The answers of a drive to requests that distinguish departures.
-fn asked<S: Subject>(bench: &mut Bench<S>) -> Vec<(&'static str, bool)> {
+fn asked<S: BenchSubject>(bench: &mut Bench<S>) -> Vec<(&'static str, bool)> {
     let node = bench.node;
     let mut lacks = |index| bench.read(index) == Err(NO_SUCH_OBJECT);
     let mut seen = vec![
@@ -87,7 +87,7 @@ fn described(name: &str) -> Vec<(String, String)> {
 
 /// The same as the manual has it.
 fn printed(file: &str) -> Vec<(String, String)> {
-    let table = Table::parse(file).expect("a table");
+    let table = CsvTable::parse(file).expect("a table");
     let mut rows: Vec<_> =
         table.rows().map(|row| (row.get("departure").to_owned(), row.get("object").to_owned())).collect();
     rows.sort();
@@ -115,7 +115,7 @@ fn numbers(words: &str) -> Vec<Vec<&str>> {
 /// What is cited is a section that the manual's row names, or one within it, or around it.
 fn assert_cited(name: &str, file: &str) {
     let model = model(name).expect("a model");
-    let table = Table::parse(file).expect("a table");
+    let table = CsvTable::parse(file).expect("a table");
     for departure in model.departures(all()) {
         let object = departure.object().map(|mux| format!("{mux:X}")).unwrap_or_default();
         let rows = table.rows().filter(|row| (row.get("departure"), row.get("object")) == (departure.key(), &*object));

@@ -3,7 +3,7 @@
 use canopen::Mux;
 use canopen::od::PdoMapping;
 use devices::servo::CIA402;
-use ferrodrive_tests::csv::Table;
+use ferrodrive_tests::csv::CsvTable;
 
 const OBJECTS: &str = include_str!("../../data/cia402/objects.csv");
 
@@ -18,7 +18,7 @@ fn heard(mux: Mux) -> Option<String> {
 #[test]
 fn every_object_of_the_profile_is_as_the_standard_has_it() {
     let mut objects = Vec::new();
-    for line in Table::parse(OBJECTS).unwrap().rows() {
+    for line in CsvTable::parse(OBJECTS).unwrap().rows() {
         let (index, sub) = (line.get("index"), line.get("sub"));
         let mux = Mux::new(u16::from_str_radix(index, 16).unwrap(), u8::from_str_radix(sub, 16).unwrap());
         // What the note says is otherwise here, and why.

@@ -2,7 +2,7 @@
 
 use canopen::NodeId;
 use drives::{mjoint, zlac8030l, zlim42c};
-use ferrodrive_tests::bench::Subject;
+use ferrodrive_tests::bench::BenchSubject;
 use ferrodrive_tests::bench::cia402::Cia402;
 use ferrodrive_tests::bench::mjoint::MJoint;
 use ferrodrive_tests::bench::zlac8030l::Zlac8030l;

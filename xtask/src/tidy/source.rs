@@ -21,13 +21,13 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) fn new(path: &str, text: &str) -> Self {
         let kinds = classify(text.as_bytes());
-        let code = view(text, &kinds, Kind::Code);
+        let code = view(text, &kinds, TextKind::Code);
         let shipped = without_tests(&code);
         Self {
             path: path.to_owned(),
             text: text.to_owned(),
             shipped,
-            comments: view(text, &kinds, Kind::Comment),
+            comments: view(text, &kinds, TextKind::Comment),
             breaks: text.match_indices('\n').map(|(at, _)| at).collect(),
             code,
         }
@@ -77,14 +77,14 @@ pub(crate) fn closing_brace(code: &str, open: usize) -> usize {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum TextKind {
     Code,
     Comment,
     Text,
 }
 
-fn classify(bytes: &[u8]) -> Vec<Kind> {
-    let mut kinds = vec![Kind::Code; bytes.len()];
+fn classify(bytes: &[u8]) -> Vec<TextKind> {
+    let mut kinds = vec![TextKind::Code; bytes.len()];
     let mut at = 0;
     while at < bytes.len() {
         let (kind, length) = token(bytes, at);
@@ -95,21 +95,21 @@ fn classify(bytes: &[u8]) -> Vec<Kind> {
 }
 
 /// The kind and the length of what begins at `at`.
-fn token(bytes: &[u8], at: usize) -> (Kind, usize) {
+fn token(bytes: &[u8], at: usize) -> (TextKind, usize) {
     let rest = &bytes[at..];
     let within_name = at > 0 && (bytes[at - 1].is_ascii_alphanumeric() || bytes[at - 1] == b'_');
     if rest.starts_with(b"//") {
-        (Kind::Comment, rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len()))
+        (TextKind::Comment, rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len()))
     } else if rest.starts_with(b"/*") {
-        (Kind::Comment, block_comment(rest))
+        (TextKind::Comment, block_comment(rest))
     } else if let Some(length) = raw_string(rest).filter(|_| !within_name) {
-        (Kind::Text, length)
+        (TextKind::Text, length)
     } else if rest[0] == b'"' {
-        (Kind::Text, quoted(rest))
+        (TextKind::Text, quoted(rest))
     } else if rest[0] == b'\'' {
-        character(rest).map_or((Kind::Code, 1), |length| (Kind::Text, length))
+        character(rest).map_or((TextKind::Code, 1), |length| (TextKind::Text, length))
     } else {
-        (Kind::Code, 1)
+        (TextKind::Code, 1)
     }
 }
 
@@ -169,8 +169,8 @@ fn character(rest: &[u8]) -> Option<usize> {
     one.then_some(close + 1)
 }
 
-fn view(text: &str, kinds: &[Kind], wanted: Kind) -> String {
-    let keep = |(byte, kind): (u8, &Kind)| if *kind == wanted || byte == b'\n' { byte } else { b' ' };
+fn view(text: &str, kinds: &[TextKind], wanted: TextKind) -> String {
+    let keep = |(byte, kind): (u8, &TextKind)| if *kind == wanted || byte == b'\n' { byte } else { b' ' };
     let bytes: Vec<u8> = text.bytes().zip(kinds).map(keep).collect();
     String::from_utf8_lossy(&bytes).into_owned()
 }

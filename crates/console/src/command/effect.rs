@@ -6,7 +6,7 @@ use master::drive::Command;
 
 /// What a command does to drives, as far as a host has to know it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub enum CommandEffect {
     /// It reads.
     None,
     /// It commands a drive.

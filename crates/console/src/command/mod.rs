@@ -24,7 +24,7 @@ use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
 use drive::{StateReport, StopOutcome};
-pub use effect::Effect;
+pub use effect::CommandEffect;
 use motion::MotionOutcome;
 use object::ObjectReport;
 
@@ -125,31 +125,33 @@ impl Command {
     }
 
     /// What it does to drives.
-    pub fn effect(&self) -> Effect {
+    pub fn effect(&self) -> CommandEffect {
         use master_drive::Command as Of;
-        let moves = |(node, motion): (_, Motion)| Effect::OnDrive(node, motion.into());
+        let moves = |(node, motion): (_, Motion)| CommandEffect::OnDrive(node, motion.into());
         match self {
-            Self::Scan(_) | Self::State(_) | Self::Explain(_) => Effect::None,
+            Self::Scan(_) | Self::State(_) | Self::Explain(_) => CommandEffect::None,
             Self::Write(command) => command.effect(),
-            Self::Enable(command) => Effect::OnDrive(command.node, Of::Enable),
-            Self::Disable(command) => Effect::OnDrive(command.node, Of::Disable),
-            Self::Reset(command) => Effect::OnDrive(command.node, Of::ResetFault),
-            Self::Estop(_) => Effect::StopAll,
-            Self::Stop(command) => stop_of(command.nodes, Of::Stop, Effect::StopAllByRamp),
-            Self::QuickStop(command) => stop_of(command.nodes, Of::QuickStop, Effect::StopAll),
+            Self::Enable(command) => CommandEffect::OnDrive(command.node, Of::Enable),
+            Self::Disable(command) => CommandEffect::OnDrive(command.node, Of::Disable),
+            Self::Reset(command) => CommandEffect::OnDrive(command.node, Of::ResetFault),
+            Self::Estop(_) => CommandEffect::StopAll,
+            Self::Stop(command) => stop_of(command.nodes, Of::Stop, CommandEffect::StopAllByRamp),
+            Self::QuickStop(command) => stop_of(command.nodes, Of::QuickStop, CommandEffect::StopAll),
             Self::Velocity(command) => moves((command.node, command.motion())),
             Self::Move(command) => moves((command.node, command.motion())),
             Self::Torque(command) => moves((command.node, command.motion())),
             Self::Home(command) => moves((command.node, command.motion())),
-            Self::Save(command) => Effect::Stores(command.node),
-            Self::Nmt(command) => command.change().map_or(Effect::ManagesMore, |(node, to)| Effect::Manages(node, to)),
+            Self::Save(command) => CommandEffect::Stores(command.node),
+            Self::Nmt(command) => {
+                command.change().map_or(CommandEffect::ManagesMore, |(node, to)| CommandEffect::Manages(node, to))
+            }
         }
     }
 }
 
-fn stop_of(nodes: Nodes, stop: master_drive::Command, all: Effect) -> Effect {
+fn stop_of(nodes: Nodes, stop: master_drive::Command, all: CommandEffect) -> CommandEffect {
     match nodes {
-        Nodes::One(node) => Effect::OnDrive(node, stop),
+        Nodes::One(node) => CommandEffect::OnDrive(node, stop),
         Nodes::All => all,
     }
 }

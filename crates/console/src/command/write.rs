@@ -11,7 +11,7 @@ use words::node::node;
 use words::object::{ObjectArg, object};
 use words::value::{Typed, typed_alone, typed_for};
 
-use super::effect::Effect;
+use super::effect::CommandEffect;
 use super::object::{ObjectReport, counts_per_unit, moving_limits, resolve};
 use crate::context::Context;
 use crate::failure::Failure;
@@ -40,12 +40,12 @@ pub struct Write {
 
 impl Write {
     /// What it does to drives.
-    pub(crate) fn effect(&self) -> Effect {
+    pub(crate) fn effect(&self) -> CommandEffect {
         let object = match &self.object {
             ObjectArg::Mux(mux) => format!("{mux:X}"),
             ObjectArg::Name(name) => name.clone(),
         };
-        Effect::Writes(self.node, object, self.value.clone().unwrap_or_default())
+        CommandEffect::Writes(self.node, object, self.value.clone().unwrap_or_default())
     }
 
     /// Whether the value is in a file.

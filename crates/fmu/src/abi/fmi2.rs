@@ -4,11 +4,11 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::Path;
 
 use super::held::{self, Log};
-use super::status::{Logger, Status};
+use super::status::{FmiStatus, Logger};
 use super::values::{read, write};
 use super::{call, slice, slice_mut, text, wrong};
 use crate::config::Config;
-use crate::fmi2::{Kind, folder, from_integer, integer, real};
+use crate::fmi2::{VariableKind, folder, from_integer, integer, real};
 use crate::instance::Mode;
 use crate::variable::Value;
 
@@ -46,7 +46,7 @@ pub extern "C" fn fmi2SetDebugLogging(
     _on: c_int,
     _count: usize,
     _categories: *const c_void,
-) -> Status {
+) -> FmiStatus {
     call(handle, |_| Ok(()))
 }
 
@@ -96,7 +96,7 @@ pub extern "C" fn fmi2SetupExperiment(
     start_time: f64,
     stop_time_defined: c_int,
     stop_time: f64,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         let stop = (stop_time_defined != 0).then_some(stop_time);
         if held.instance.mode() != Mode::Instantiated {
@@ -118,13 +118,13 @@ pub extern "C" fn fmi2SetupExperiment(
 
 /// `fmi2EnterInitializationMode`.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2EnterInitializationMode(handle: *mut c_void) -> Status {
+pub extern "C" fn fmi2EnterInitializationMode(handle: *mut c_void) -> FmiStatus {
     call(handle, |held| held.instance.enter_initialization(held.span_s.0))
 }
 
 /// `fmi2DoStep`: always the whole step.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2DoStep(handle: *mut c_void, from: f64, step: f64, _no_set_state_prior: c_int) -> Status {
+pub extern "C" fn fmi2DoStep(handle: *mut c_void, from: f64, step: f64, _no_set_state_prior: c_int) -> FmiStatus {
     call(handle, |held| {
         if let Some(stop) = held.span_s.1.filter(|stop| from + step > stop + ROUNDED * step) {
             return wrong(format!("a step from {from} s by {step} s is beyond the stop time of {stop} s"));
@@ -135,40 +135,40 @@ pub extern "C" fn fmi2DoStep(handle: *mut c_void, from: f64, step: f64, _no_set_
 
 /// The name of the type of a value in FMI 2.0.
 fn kind_of(value: &Value) -> &'static str {
-    Kind::of(value).element()
+    VariableKind::of(value).element()
 }
 
 /// `fmi2GetReal`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetReal(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut f64) -> Status {
+pub unsafe extern "C" fn fmi2GetReal(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut f64) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { read(h, (vr, nvr), (values, nvr), |value| real(&value), kind_of) }
 }
 
 /// `fmi2SetReal`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetReal(h: *mut c_void, vr: *const u32, nvr: usize, values: *const f64) -> Status {
+pub unsafe extern "C" fn fmi2SetReal(h: *mut c_void, vr: *const u32, nvr: usize, values: *const f64) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { write(h, (vr, nvr), (values, nvr), |value| Ok(Value::Float64(value))) }
 }
 
 /// `fmi2GetInteger`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetInteger(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut c_int) -> Status {
+pub unsafe extern "C" fn fmi2GetInteger(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut c_int) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { read(h, (vr, nvr), (values, nvr), |value| integer(&value), kind_of) }
 }
 
 /// `fmi2SetInteger`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(h: *mut c_void, vr: *const u32, nvr: usize, values: *const c_int) -> Status {
+pub unsafe extern "C" fn fmi2SetInteger(h: *mut c_void, vr: *const u32, nvr: usize, values: *const c_int) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { write(h, (vr, nvr), (values, nvr), from_integer) }
 }
 
 /// `fmi2GetBoolean`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut c_int) -> Status {
+pub unsafe extern "C" fn fmi2GetBoolean(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut c_int) -> FmiStatus {
     let take = |value| if let Value::Boolean(it) = value { Some(c_int::from(it)) } else { None };
     // SAFETY: handed on as it came.
     unsafe { read(h, (vr, nvr), (values, nvr), take, kind_of) }
@@ -176,7 +176,7 @@ pub unsafe extern "C" fn fmi2GetBoolean(h: *mut c_void, vr: *const u32, nvr: usi
 
 /// `fmi2SetBoolean`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(h: *mut c_void, vr: *const u32, nvr: usize, values: *const c_int) -> Status {
+pub unsafe extern "C" fn fmi2SetBoolean(h: *mut c_void, vr: *const u32, nvr: usize, values: *const c_int) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { write(h, (vr, nvr), (values, nvr), |value| Ok(Value::Boolean(value != 0))) }
 }
@@ -188,7 +188,7 @@ pub unsafe extern "C" fn fmi2GetString(
     references: *const u32,
     count: usize,
     values: *mut *const c_char,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let (references, values) = unsafe { (slice(references, count)?, slice_mut(values, count)?) };
@@ -208,7 +208,7 @@ pub unsafe extern "C" fn fmi2GetString(
 
 /// `fmi2SetString`: no variable that can be set is a text.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetString(h: *mut c_void, _vr: *const u32, nvr: usize, _values: *const c_void) -> Status {
+pub extern "C" fn fmi2SetString(h: *mut c_void, _vr: *const u32, nvr: usize, _values: *const c_void) -> FmiStatus {
     call(h, |_| if nvr == 0 { Ok(()) } else { wrong("no variable for fmi2SetString") })
 }
 
@@ -267,7 +267,7 @@ mod tests {
     }
 
     /// One call with arguments of no sense, but for memory, which is the importer's word.
-    fn any_call(handle: *mut c_void, mut random: impl FnMut(u32) -> u32) -> Status {
+    fn any_call(handle: *mut c_void, mut random: impl FnMut(u32) -> u32) -> FmiStatus {
         let references = [random(30), 200 + random(20), 400 + random(8), random(u32::MAX)].map(|it| it % 1_000);
         let reals = [0.0, 1.0, -3.0, f64::NAN, f64::INFINITY, 1e300, 1e-3, -1e-3];
         let real = reals[random(8) as usize];
@@ -314,7 +314,11 @@ mod tests {
 
     /// One call of a function of states, which of them, and how it ends: a state that is held, was freed or never was, bytes as they
     /// were written or with one changed, room for all of them or too little.
-    fn any_call_of_states(handle: *mut c_void, it: &mut States, mut random: impl FnMut(u32) -> u32) -> (usize, Status) {
+    fn any_call_of_states(
+        handle: *mut c_void,
+        it: &mut States,
+        mut random: impl FnMut(u32) -> u32,
+    ) -> (usize, FmiStatus) {
         let place = random(2) as usize;
         let state = [it.held[place], it.held[place], it.freed, random(u32::MAX) as *mut c_void][random(4) as usize];
         let call = random(6) as usize;
@@ -442,7 +446,7 @@ mod tests {
     #[test]
     fn an_experiment_that_is_not_possible_says_what_is() {
         static SAID: Mutex<Vec<String>> = Mutex::new(Vec::new());
-        unsafe extern "C" fn log(_: *mut c_void, _: Status, _: *const c_char, message: *const c_char) {
+        unsafe extern "C" fn log(_: *mut c_void, _: FmiStatus, _: *const c_char, message: *const c_char) {
             // SAFETY: a text of the caller's.
             SAID.lock().unwrap().push(unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned());
         }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::status::{DEFECT, ERROR, FATAL, LogMessage, Logger, Status};
+use super::status::{DEFECT, ERROR, FATAL, FmiStatus, LogMessage, Logger};
 use crate::config::Config;
 use crate::instance::Instance;
 use crate::state::SavedState;
@@ -67,7 +67,7 @@ impl Log {
     }
 
     /// A message of a call that ends with `status`.
-    pub(super) fn say(&self, status: Status, what: &str) {
+    pub(super) fn say(&self, status: FmiStatus, what: &str) {
         let what = what.replace('\0', " ");
         let category = if status == FATAL { c"logStatusFatal" } else { c"logStatusError" };
         let environment = self.environment as *mut c_void;

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::held::{self, Log};
-use super::status::{ERROR, LogMessage, Status};
+use super::status::{ERROR, FmiStatus, LogMessage};
 use super::{call, carry_out, put, text};
 use crate::config::Config;
 
@@ -13,19 +13,19 @@ macro_rules! life {
     ($exit_initialization:ident, $terminate:ident, $reset:ident, $free:ident) => {
         #[doc = concat!("`", stringify!($exit_initialization), "`.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $exit_initialization(handle: *mut c_void) -> Status {
+        pub extern "C" fn $exit_initialization(handle: *mut c_void) -> FmiStatus {
             call(handle, |held| held.instance.exit_initialization())
         }
 
         #[doc = concat!("`", stringify!($terminate), "`.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $terminate(handle: *mut c_void) -> Status {
+        pub extern "C" fn $terminate(handle: *mut c_void) -> FmiStatus {
             call(handle, |held| held.instance.terminate())
         }
 
         #[doc = concat!("`", stringify!($reset), "`: also after a panic.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $reset(handle: *mut c_void) -> Status {
+        pub extern "C" fn $reset(handle: *mut c_void) -> FmiStatus {
             carry_out(handle, |held| {
                 held.instance.reset().map_err(|error| (ERROR, error.to_string()))?;
                 (held.is_broken, held.span_s) = (false, (0.0, None));
@@ -57,7 +57,7 @@ pub extern "C" fn fmi3SetDebugLogging(
     _on: u8,
     _count: usize,
     _categories: *const c_void,
-) -> Status {
+) -> FmiStatus {
     call(handle, |_| Ok(()))
 }
 
@@ -99,25 +99,25 @@ pub extern "C" fn fmi3EnterInitializationMode(
     start_time: f64,
     _stop_time_defined: u8,
     _stop_time: f64,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| held.instance.enter_initialization(start_time))
 }
 
 /// `fmi3EnterEventMode`.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3EnterEventMode(handle: *mut c_void) -> Status {
+pub extern "C" fn fmi3EnterEventMode(handle: *mut c_void) -> FmiStatus {
     call(handle, |held| held.instance.enter_event())
 }
 
 /// `fmi3EnterStepMode`.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3EnterStepMode(handle: *mut c_void) -> Status {
+pub extern "C" fn fmi3EnterStepMode(handle: *mut c_void) -> FmiStatus {
     call(handle, |held| held.instance.enter_step())
 }
 
 /// `fmi3EvaluateDiscreteStates`: outputs change with `fmi3UpdateDiscreteStates` alone.
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3EvaluateDiscreteStates(handle: *mut c_void) -> Status {
+pub extern "C" fn fmi3EvaluateDiscreteStates(handle: *mut c_void) -> FmiStatus {
     call(handle, |_| Ok(()))
 }
 
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn fmi3UpdateDiscreteStates(
     states_changed: *mut u8,
     next_event_defined: *mut u8,
     next_event: *mut f64,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         let again = held.instance.update()?;
         // SAFETY: places for results by the importer's word.
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn fmi3DoStep(
     terminate: *mut u8,
     early_return: *mut u8,
     last_time: *mut f64,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         let stepped = held.instance.step(from, step)?;
         // SAFETY: places for results by the importer's word.

@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use super::status::Status;
+use super::status::FmiStatus;
 use super::{call, put, slice, slice_mut, wrong};
 use crate::state::SavedState;
 
@@ -11,7 +11,7 @@ macro_rules! states {
     ($get:ident, $set:ident, $free:ident, $size:ident, $serialize:ident, $deserialize:ident) => {
         #[doc = concat!("`", stringify!($get), "`: a state that was handed out before is written anew.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $get(handle: *mut c_void, state: *mut *mut c_void) -> Status {
+        pub unsafe extern "C" fn $get(handle: *mut c_void, state: *mut *mut c_void) -> FmiStatus {
             call(handle, |held| {
                 // SAFETY: a place for a pointer by the importer's word.
                 let place = unsafe { slice_mut(state, 1)? };
@@ -24,7 +24,7 @@ macro_rules! states {
 
         #[doc = concat!("`", stringify!($set), "`.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $set(handle: *mut c_void, state: *mut c_void) -> Status {
+        pub extern "C" fn $set(handle: *mut c_void, state: *mut c_void) -> FmiStatus {
             call(handle, |held| match held.states.get(&(state as usize)) {
                 Some(saved) => saved.restore(&mut held.instance),
                 None => wrong("no state of this instance"),
@@ -33,7 +33,7 @@ macro_rules! states {
 
         #[doc = concat!("`", stringify!($free), "`.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $free(handle: *mut c_void, state: *mut *mut c_void) -> Status {
+        pub unsafe extern "C" fn $free(handle: *mut c_void, state: *mut *mut c_void) -> FmiStatus {
             call(handle, |held| {
                 if !state.is_null() {
                     // SAFETY: a place for a pointer by the importer's word.
@@ -47,7 +47,7 @@ macro_rules! states {
 
         #[doc = concat!("`", stringify!($size), "`.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $size(handle: *mut c_void, state: *mut c_void, size: *mut usize) -> Status {
+        pub unsafe extern "C" fn $size(handle: *mut c_void, state: *mut c_void, size: *mut usize) -> FmiStatus {
             call(handle, |held| {
                 let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
                 // SAFETY: a place for a result by the importer's word.
@@ -63,7 +63,7 @@ macro_rules! states {
             state: *mut c_void,
             bytes: *mut u8,
             size: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             call(handle, |held| {
                 let Some(saved) = held.states.get(&(state as usize)) else { return wrong("no state of this instance") };
                 let written = saved.bytes()?;
@@ -84,7 +84,7 @@ macro_rules! states {
             bytes: *const u8,
             size: usize,
             state: *mut *mut c_void,
-        ) -> Status {
+        ) -> FmiStatus {
             call(handle, |held| {
                 // SAFETY: as many bytes, and a place for a pointer, by the importer's word.
                 let (bytes, place) = unsafe { (slice(bytes, size)?, slice_mut(state, 1)?) };

@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use super::status::Status;
+use super::status::FmiStatus;
 use super::{call, wrong};
 
 /// Functions of an instance that end with an error. What stands behind the first argument is not looked at.
@@ -11,7 +11,7 @@ macro_rules! unsupported {
         $(
             #[doc = concat!("`", stringify!($name), "`: an error, as the description of the model does not offer it.")]
             #[unsafe(no_mangle)]
-            pub extern "C" fn $name(handle: *mut c_void, $(_: $argument),*) -> Status {
+            pub extern "C" fn $name(handle: *mut c_void, $(_: $argument),*) -> FmiStatus {
                 call(handle, |_| wrong(concat!(stringify!($name), " is not offered by this FMU")))
             }
         )*

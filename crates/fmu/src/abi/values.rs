@@ -2,7 +2,7 @@
 
 use std::ffi::{c_char, c_void};
 
-use super::status::Status;
+use super::status::FmiStatus;
 use super::{call, slice, slice_mut, wrong};
 use crate::call::Called;
 use crate::instance::Interval;
@@ -23,7 +23,7 @@ pub(super) unsafe fn read<T>(
     values: (*mut T, usize),
     take: impl Fn(Value) -> Option<T>,
     kind_of: fn(&Value) -> &'static str,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         check_counts(references.1, values.1)?;
         // SAFETY: arrays of these counts by the importer's word.
@@ -44,7 +44,7 @@ pub(super) unsafe fn write<T: Copy>(
     references: (*const u32, usize),
     values: (*const T, usize),
     give: impl Fn(T) -> Called<Value>,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         check_counts(references.1, values.1)?;
         // SAFETY: arrays of these counts by the importer's word.
@@ -62,7 +62,13 @@ macro_rules! of_type {
     ($get:ident, $set:ident, $c:ty, $kind:ident) => {
         #[doc = concat!("`", stringify!($get), "`.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $get(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut $c, n: usize) -> Status {
+        pub unsafe extern "C" fn $get(
+            h: *mut c_void,
+            vr: *const u32,
+            nvr: usize,
+            values: *mut $c,
+            n: usize,
+        ) -> FmiStatus {
             // SAFETY: handed on as it came.
             unsafe {
                 read(
@@ -83,7 +89,7 @@ macro_rules! of_type {
             nvr: usize,
             values: *const $c,
             n: usize,
-        ) -> Status {
+        ) -> FmiStatus {
             // SAFETY: handed on as it came.
             unsafe { write(h, (vr, nvr), (values, n), |value| Ok(Value::$kind(value))) }
         }
@@ -102,14 +108,26 @@ macro_rules! of_no_variable {
     ($get:ident, $set:ident, $c:ty) => {
         #[doc = concat!("`", stringify!($get), "`: no variable has this type.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $get(h: *mut c_void, vr: *const u32, nvr: usize, values: *mut $c, n: usize) -> Status {
+        pub unsafe extern "C" fn $get(
+            h: *mut c_void,
+            vr: *const u32,
+            nvr: usize,
+            values: *mut $c,
+            n: usize,
+        ) -> FmiStatus {
             // SAFETY: handed on as it came.
             unsafe { read(h, (vr, nvr), (values, n), |_| None, Value::type_name) }
         }
 
         #[doc = concat!("`", stringify!($set), "`: no variable has this type.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $set(h: *mut c_void, _vr: *const u32, nvr: usize, _values: *const $c, _n: usize) -> Status {
+        pub extern "C" fn $set(
+            h: *mut c_void,
+            _vr: *const u32,
+            nvr: usize,
+            _values: *const $c,
+            _n: usize,
+        ) -> FmiStatus {
             call(h, |_| if nvr == 0 { Ok(()) } else { wrong(concat!("no variable for ", stringify!($set))) })
         }
     };
@@ -129,7 +147,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(
     nvr: usize,
     values: *mut u8,
     n: usize,
-) -> Status {
+) -> FmiStatus {
     let take = |value| if let Value::Boolean(it) = value { Some(u8::from(it)) } else { None };
     // SAFETY: handed on as it came.
     unsafe { read(h, (vr, nvr), (values, n), take, Value::type_name) }
@@ -143,7 +161,7 @@ pub unsafe extern "C" fn fmi3SetBoolean(
     nvr: usize,
     values: *const u8,
     n: usize,
-) -> Status {
+) -> FmiStatus {
     // SAFETY: handed on as it came.
     unsafe { write(h, (vr, nvr), (values, n), |value| Ok(Value::Boolean(value != 0))) }
 }
@@ -157,7 +175,7 @@ pub unsafe extern "C" fn fmi3GetBinary(
     sizes: *mut usize,
     values: *mut *const u8,
     value_count: usize,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         check_counts(count, value_count)?;
         // SAFETY: arrays of these counts by the importer's word.
@@ -183,7 +201,7 @@ pub unsafe extern "C" fn fmi3SetBinary(
     sizes: *const usize,
     values: *const *const u8,
     value_count: usize,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         check_counts(count, value_count)?;
         // SAFETY: arrays of these counts by the importer's word.
@@ -203,7 +221,12 @@ pub unsafe extern "C" fn fmi3SetBinary(
 
 /// `fmi3GetClock`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetClock(h: *mut c_void, references: *const u32, count: usize, values: *mut u8) -> Status {
+pub unsafe extern "C" fn fmi3GetClock(
+    h: *mut c_void,
+    references: *const u32,
+    count: usize,
+    values: *mut u8,
+) -> FmiStatus {
     call(h, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let (references, values) = unsafe { (slice(references, count)?, slice_mut(values, count)?) };
@@ -221,7 +244,7 @@ pub unsafe extern "C" fn fmi3SetClock(
     references: *const u32,
     count: usize,
     values: *const u8,
-) -> Status {
+) -> FmiStatus {
     call(h, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let (references, values) = unsafe { (slice(references, count)?, slice(values, count)?) };
@@ -247,7 +270,7 @@ pub unsafe extern "C" fn fmi3GetIntervalDecimal(
     count: usize,
     intervals: *mut f64,
     qualifiers: *mut i32,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let references = unsafe { slice(references, count)? };
@@ -270,7 +293,7 @@ pub unsafe extern "C" fn fmi3GetIntervalFraction(
     counters: *mut u64,
     resolutions: *mut u64,
     qualifiers: *mut i32,
-) -> Status {
+) -> FmiStatus {
     call(handle, |held| {
         // SAFETY: arrays of this count by the importer's word.
         let (references, counters) = unsafe { (slice(references, count)?, slice_mut(counters, count)?) };

@@ -7,7 +7,7 @@ use words::escaped;
 
 use super::parts::{LOG_CATEGORIES, MODEL_IDENTIFIER, dependencies, token, units};
 use crate::config::{AxisConfig, Config};
-use crate::fmi2::Kind;
+use crate::fmi2::VariableKind;
 use crate::variable::{Causality, Variable};
 
 /// `modelDescription.xml` (FMI 2.0.5, 2.2 and 4.3).
@@ -46,13 +46,13 @@ pub(super) fn model_description(
 
 fn element(xml: &mut String, variable: &Variable) {
     let Variable { reference, name, causality, value, unit, description, .. } = variable;
-    let kind = Kind::of(value);
+    let kind = VariableKind::of(value);
     let (variability, initial) = match (causality, kind) {
         (Causality::Parameter, _) => ("fixed", " initial=\"exact\""),
-        (Causality::Output, Kind::Real) => ("continuous", " initial=\"calculated\""),
+        (Causality::Output, VariableKind::Real) => ("continuous", " initial=\"calculated\""),
         (Causality::Output, _) => ("discrete", " initial=\"calculated\""),
         // An input has none (FMI 2.0.5, 2.2.7).
-        (Causality::Input, Kind::Real) => ("continuous", ""),
+        (Causality::Input, VariableKind::Real) => ("continuous", ""),
         (Causality::Input, _) => ("discrete", ""),
     };
     let _ = write!(

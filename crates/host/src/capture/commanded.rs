@@ -146,7 +146,7 @@ impl Host {
         let outcome = outcome.map(|(captures, value)| {
             let kept = self.captured.entry(node).or_default();
             for (name, capture, followed) in captures {
-                if let Ok(mut row) = report::Capture::of_record(name, recorded(capture), node) {
+                if let Ok(mut row) = report::ReportedCapture::of_record(name, recorded(capture), node) {
                     // What a capture alone does not show.
                     row.merit.iter_mut().for_each(|merit| merit.followed = followed);
                     kept.truncate(MOST_REPORTED - 1);
@@ -190,7 +190,7 @@ impl Host {
 async fn page_of(
     drive: &Drive,
     made: Made,
-    captures: Vec<report::Capture>,
+    captures: Vec<report::ReportedCapture>,
     tunings: Vec<report::Tuning>,
 ) -> Result<Value, Refusal> {
     let mut report = NodeReport::read(&(), drive, made).await.map_err(|failure| refusal(&failure))?;

@@ -53,7 +53,7 @@ impl Form {
 
 /// In which unit a short name has its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum QuantityKind {
     /// Degrees of the output.
     Angle,
     /// r/min of the output, by the model's object of the actual velocity.
@@ -65,41 +65,41 @@ enum Kind {
 }
 
 /// Where the values of a short name are.
-enum Place {
+enum QuantityPlace {
     Standard(Mux),
     Model(fn(&Units) -> Option<devices::Quantity>),
 }
 
 struct Short {
     name: &'static str,
-    kind: Kind,
-    place: Place,
+    kind: QuantityKind,
+    place: QuantityPlace,
 }
 
-const fn standard(name: &'static str, kind: Kind, mux: Mux) -> Short {
-    Short { name, kind, place: Place::Standard(mux) }
+const fn standard(name: &'static str, kind: QuantityKind, mux: Mux) -> Short {
+    Short { name, kind, place: QuantityPlace::Standard(mux) }
 }
 
-const fn of_model(name: &'static str, kind: Kind, place: fn(&Units) -> Option<devices::Quantity>) -> Short {
-    Short { name, kind, place: Place::Model(place) }
+const fn of_model(name: &'static str, kind: QuantityKind, place: fn(&Units) -> Option<devices::Quantity>) -> Short {
+    Short { name, kind, place: QuantityPlace::Model(place) }
 }
 
 /// Demand values and actual ones (CiA 402-2: 607Ah, 6062h, 6064h, 60F4h, 60FFh, 606Bh, 606Ch, 6071h, 6074h, 6077h, or where a model has
 /// them).
 const SHORT: [Short; 13] = [
-    standard("target_position", Kind::Angle, TARGET_POSITION),
-    standard("position_demand", Kind::Angle, Mux::new(0x6062, 0)),
-    standard("position", Kind::Angle, POSITION_ACTUAL_VALUE),
-    standard("following_error", Kind::Angle, Mux::new(0x60F4, 0)),
-    of_model("target_velocity", Kind::Speed, |units| units.target_velocity),
-    standard("velocity_demand", Kind::Speed, Mux::new(0x606B, 0)),
-    of_model("velocity", Kind::Speed, |units| units.actual_velocity),
-    of_model("target_current", Kind::Current, |units| units.target_current),
-    standard("current_demand", Kind::Current, Mux::new(0x6074, 0)),
-    of_model("current", Kind::Current, |units| units.actual_current),
-    of_model("supply", Kind::Own("V"), |units| units.bus_voltage),
-    of_model("motor_temperature", Kind::Own("°C"), |units| units.motor_temperature),
-    of_model("driver_temperature", Kind::Own("°C"), |units| units.driver_temperature),
+    standard("target_position", QuantityKind::Angle, TARGET_POSITION),
+    standard("position_demand", QuantityKind::Angle, Mux::new(0x6062, 0)),
+    standard("position", QuantityKind::Angle, POSITION_ACTUAL_VALUE),
+    standard("following_error", QuantityKind::Angle, Mux::new(0x60F4, 0)),
+    of_model("target_velocity", QuantityKind::Speed, |units| units.target_velocity),
+    standard("velocity_demand", QuantityKind::Speed, Mux::new(0x606B, 0)),
+    of_model("velocity", QuantityKind::Speed, |units| units.actual_velocity),
+    of_model("target_current", QuantityKind::Current, |units| units.target_current),
+    standard("current_demand", QuantityKind::Current, Mux::new(0x6074, 0)),
+    of_model("current", QuantityKind::Current, |units| units.actual_current),
+    of_model("supply", QuantityKind::Own("V"), |units| units.bus_voltage),
+    of_model("motor_temperature", QuantityKind::Own("°C"), |units| units.motor_temperature),
+    of_model("driver_temperature", QuantityKind::Own("°C"), |units| units.driver_temperature),
 ];
 
 /// The short names, for messages.
@@ -168,8 +168,8 @@ impl Quantity {
         };
         let units = &axis.units;
         let quantity = match place {
-            Place::Standard(mux) => Some(axis.object(*mux)).filter(|mux| model.row(*mux).is_some()),
-            Place::Model(of) => of(units).map(|quantity| quantity.object),
+            QuantityPlace::Standard(mux) => Some(axis.object(*mux)).filter(|mux| model.row(*mux).is_some()),
+            QuantityPlace::Model(of) => of(units).map(|quantity| quantity.object),
         };
         let missing = || {
             let (of, has) = (model.name, had(model, axis).join(", "));
@@ -181,23 +181,23 @@ impl Quantity {
         // What one count of an object is worth that is scaled as another quantity of the model.
         let scaled = |like: Option<devices::Quantity>| like.map(|like| devices::Quantity { object, ..like });
         let (step, unit) = match kind {
-            Kind::Angle => (360.0 / drive.counts_per_turn().await?, "°"),
-            Kind::Speed => {
+            QuantityKind::Angle => (360.0 / drive.counts_per_turn().await?, "°"),
+            QuantityKind::Speed => {
                 let like = match place {
-                    Place::Model(of) => of(units),
-                    Place::Standard(_) => scaled(units.actual_velocity),
+                    QuantityPlace::Model(of) => of(units),
+                    QuantityPlace::Standard(_) => scaled(units.actual_velocity),
                 };
                 (drive.step_of(like.ok_or_else(missing)?).await?, "r/min")
             }
-            Kind::Current => {
+            QuantityKind::Current => {
                 let like = match place {
-                    Place::Model(of) => of(units),
-                    Place::Standard(_) => scaled(units.target_current.or(units.actual_current)),
+                    QuantityPlace::Model(of) => of(units),
+                    QuantityPlace::Standard(_) => scaled(units.target_current.or(units.actual_current)),
                 };
                 (drive.step_of(like.ok_or_else(missing)?).await?, "A")
             }
-            Kind::Own(unit) => {
-                let Place::Model(of) = place else { return Err(missing()) };
+            QuantityKind::Own(unit) => {
+                let QuantityPlace::Model(of) = place else { return Err(missing()) };
                 (drive.step_of(of(units).ok_or_else(missing)?).await?, *unit)
             }
         };
@@ -219,8 +219,8 @@ impl fmt::Display for Quantity {
 /// The short names that an axis has.
 pub(super) fn had(model: &devices::Description, axis: &devices::AxisDescription) -> Vec<&'static str> {
     let has = |short: &&Short| match short.place {
-        Place::Standard(mux) => model.row(axis.object(mux)).is_some(),
-        Place::Model(of) => of(&axis.units).is_some(),
+        QuantityPlace::Standard(mux) => model.row(axis.object(mux)).is_some(),
+        QuantityPlace::Model(of) => of(&axis.units).is_some(),
     };
     SHORT.iter().filter(has).map(|short| short.name).collect()
 }

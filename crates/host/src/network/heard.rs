@@ -27,13 +27,13 @@ pub struct Heard {
 /// Counts what is heard.
 #[derive(Debug, Default)]
 pub struct Counted {
-    kinds: BTreeMap<Kind, (u64, String)>,
+    kinds: BTreeMap<HeardKind, (u64, String)>,
     others: u64,
 }
 
 /// In the order in which they are reported: other masters first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum HeardKind {
     /// An NMT command, an SDO request, an RPDO, an LSS request: only a master sends these.
     Nmt,
     SdoRequest(NodeId),
@@ -50,7 +50,7 @@ enum Kind {
     Id(u32),
 }
 
-impl Kind {
+impl HeardKind {
     fn of(frame: &Frame, decoded: &Decoded) -> Option<Self> {
         Some(match Service::of(frame.id()) {
             Some(Service::Nmt) => Self::Nmt,
@@ -121,13 +121,13 @@ impl Counted {
     /// Takes a frame that another station has sent.
     pub fn note(&mut self, decoder: &mut Decoder, frame: &Frame) {
         let decoded = decoder.decode(frame);
-        let Some(kind) = Kind::of(frame, &decoded) else { return };
+        let Some(kind) = HeardKind::of(frame, &decoded) else { return };
         let known = self.kinds.len();
         match self.kinds.get_mut(&kind) {
             Some((count, latest)) => {
                 *count += 1;
                 // Words are made for what is shown with its words.
-                if matches!(kind, Kind::Nmt | Kind::Emcy(_) | Kind::LssMaster) {
+                if matches!(kind, HeardKind::Nmt | HeardKind::Emcy(_) | HeardKind::LssMaster) {
                     *latest = decoded.to_string();
                 }
             }
@@ -141,7 +141,7 @@ impl Counted {
     /// What was heard, but for the heartbeats of nodes that are listed anyway.
     pub fn reported(self, is_listed: impl Fn(NodeId) -> bool) -> Vec<Heard> {
         let kinds = self.kinds.into_iter().filter(|(kind, _)| match kind {
-            Kind::Heartbeat(node) => !is_listed(*node),
+            HeardKind::Heartbeat(node) => !is_listed(*node),
             _ => true,
         });
         let mut reported: Vec<Heard> = kinds

@@ -94,7 +94,7 @@ fn plain_value(row: &Entry, bytes: &[u8]) -> String {
 
 /// A value in words, with its unit where it has one.
 pub(crate) fn value_text(model: &'static Description, mux: Mux, bytes: &[u8]) -> String {
-    let value = master::decode::Value::new(mux, bytes, Some(model));
+    let value = master::decode::DecodedValue::new(mux, bytes, Some(model));
     let decoded = value.to_string();
     // The object and its name come before.
     let text = decoded.split_once(" = ").map_or(decoded.as_str(), |(_, text)| text);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use host::network::report::{Capture, Made, NodeReport, Tuning};
+use host::network::report::{Made, NodeReport, ReportedCapture, Tuning};
 use pyo3::prelude::*;
 use recording::{Kind, read};
 use words::document::read_bytes;
@@ -41,7 +41,7 @@ pub(crate) fn report(
 }
 
 /// What a record has of the node.
-fn capture(path: &Path, asked: &AskedDrive) -> Result<Capture, Failure> {
+fn capture(path: &Path, asked: &AskedDrive) -> Result<ReportedCapture, Failure> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let refused = |reason: String| {
         Failure::bad_file(format!("{} is not a record of node {}", path.display(), asked.node))
@@ -50,7 +50,7 @@ fn capture(path: &Path, asked: &AskedDrive) -> Result<Capture, Failure> {
     };
     let kind = Kind::of_name(&name).ok_or_else(|| refused("its name ends in neither .mcap nor .csv".to_owned()))?;
     let recorded = read_bytes(path, LARGEST).and_then(|bytes| read(kind, &bytes)).map_err(refused)?;
-    Capture::of_record(name, recorded, asked.node).map_err(refused)
+    ReportedCapture::of_record(name, recorded, asked.node).map_err(refused)
 }
 
 /// What a tuning of the node has given.

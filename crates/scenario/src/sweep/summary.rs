@@ -27,7 +27,7 @@ pub struct Summary {
     failures: u64,
     /// By the parameter that is swept, and by its value: runs that passed, and that failed.
     values: Vec<Vec<(u64, u64)>>,
-    figures: BTreeMap<String, Figure>,
+    figures: BTreeMap<String, FigureSpread>,
 }
 
 /// The runs of one setting of the parameters, which differ in their seeds alone.
@@ -85,7 +85,7 @@ pub struct Distribution {
 }
 
 #[derive(Clone, Debug)]
-struct Figure {
+struct FigureSpread {
     runs: u64,
     /// Value and number of the run; among equals the lowest number.
     min: (f64, u64),
@@ -117,7 +117,7 @@ impl Summary {
     ) {
         for (name, value) in figures.into_iter().filter(|(_, value)| value.is_finite()) {
             let figure = self.figures.entry(name.to_owned());
-            figure.or_insert_with(|| Figure::new(value, number)).add(value, number);
+            figure.or_insert_with(|| FigureSpread::new(value, number)).add(value, number);
         }
         self.count_values(sweep, number, failure.is_some());
         let Some((asked, seen)) = failure else {
@@ -208,7 +208,7 @@ impl Summary {
 
     /// How each named figure is distributed.
     pub fn distributions(&self, sweep: &Sweep) -> Vec<Distribution> {
-        let distribution = |(name, figure): (&String, &Figure)| {
+        let distribution = |(name, figure): (&String, &FigureSpread)| {
             let mut kept: Vec<f64> = figure.kept.values().copied().collect();
             kept.sort_by(f64::total_cmp);
             let half = kept.len() / 2;
@@ -228,7 +228,7 @@ impl Summary {
     }
 }
 
-impl Figure {
+impl FigureSpread {
     fn new(value: f64, number: u64) -> Self {
         Self { runs: 0, min: (value, number), max: (value, number), kept: BTreeMap::new(), stride: 1 }
     }
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn of_equal_values_the_first_run_is_named_whichever_ends_first() {
         for numbers in [[3, 8], [8, 3]] {
-            let mut figure = Figure::new(2.0, numbers[0]);
+            let mut figure = FigureSpread::new(2.0, numbers[0]);
             numbers.iter().for_each(|number| figure.add(2.0, *number));
             assert_eq!((figure.min, figure.max), ((2.0, 3), (2.0, 3)));
         }

@@ -8,7 +8,7 @@ mod models;
 
 pub use kernel::Machine;
 pub use kernel::assembly::{Assembly, ShaftFacts};
-pub use kernel::quantity::Quantity;
+pub use kernel::quantity::QuantityRange;
 pub use kernel::realism::{Noise, Realism};
 pub use kernel::timing::TimingMode;
 pub use models::*;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use can::{Frame, Instant};
 use canlog::text;
 
-use super::codec::{Decoder, Message, Reply, Request};
+use super::codec::{Decoder, Message, Request, ServerReply};
 use crate::link::{Link, within};
 use crate::note::Suspicions;
 use crate::reconnect::Reopen;
@@ -23,7 +23,7 @@ const CLASS_MASK: u32 = 0x1FFF_FFFF;
 #[derive(Debug)]
 pub struct SocketcandBus {
     link: Link,
-    decoder: Decoder<Reply>,
+    decoder: Decoder<ServerReply>,
     clock: WallClock,
     /// What one error message said and was not fetched yet: a handful.
     notes: VecDeque<Note>,
@@ -41,20 +41,20 @@ impl SocketcandBus {
             notes: VecDeque::new(),
             suspicions: Suspicions::default(),
         };
-        connection.expect(Reply::Hi, "< hi >", "the greeting").await?;
+        connection.expect(ServerReply::Hi, "< hi >", "the greeting").await?;
         for request in [Request::Open(bus.to_owned()), Request::RawMode] {
             let shown = if request == Request::RawMode { "rawmode".to_owned() } else { format!("open {bus}") };
             connection.link.send(|out| request.emit(out)).await?;
-            connection.expect(Reply::Ok, "< ok >", &shown).await?;
+            connection.expect(ServerReply::Ok, "< ok >", &shown).await?;
         }
         Ok(connection)
     }
 
-    async fn expect(&mut self, expected: Reply, text: &'static str, request: &str) -> Result<(), BusError> {
+    async fn expect(&mut self, expected: ServerReply, text: &'static str, request: &str) -> Result<(), BusError> {
         let clock = self.clock.clone();
         match within(&clock, PATIENCE, self.reply()).await {
             Some(Ok(reply)) if reply == expected => Ok(()),
-            Some(Ok(Reply::Error(said))) => {
+            Some(Ok(ServerReply::Error(said))) => {
                 Err(BusError::Refused { address: self.link.address(), request: request.to_owned(), said })
             }
             Some(Ok(reply)) => {
@@ -66,7 +66,7 @@ impl SocketcandBus {
         }
     }
 
-    async fn reply(&mut self) -> Result<Reply, BusError> {
+    async fn reply(&mut self) -> Result<ServerReply, BusError> {
         loop {
             let decoder = &mut self.decoder;
             match self.link.take(|input| decoder.next(input)) {
@@ -100,19 +100,19 @@ impl AsyncBus for SocketcandBus {
                 return Ok((self.clock.now(), note));
             }
             match self.reply().await? {
-                Reply::Frame { frame, .. } => {
+                ServerReply::Frame { frame, .. } => {
                     let frame = Received::Frame(frame);
                     self.notes.extend(self.suspicions.after(&frame));
                     return Ok((self.clock.now(), frame));
                 }
-                Reply::Error(said) => match error_class(&said) {
+                ServerReply::Error(said) => match error_class(&said) {
                     Some(class) => self.notes.extend(notes_of(class, [0; 8])),
                     None => {
                         let request = "a frame".to_owned();
                         return Err(BusError::Refused { address: self.link.address(), request, said });
                     }
                 },
-                Reply::Hi | Reply::Ok | Reply::Echo => {}
+                ServerReply::Hi | ServerReply::Ok | ServerReply::Echo => {}
             }
         }
     }

@@ -1,4 +1,4 @@
-//! socketcand messages as data: [`Request`] from client to server, [`Reply`] back, and a [`Decoder`] for either.
+//! socketcand messages as data: [`Request`] from client to server, [`ServerReply`] back, and a [`Decoder`] for either.
 //!
 //! Pure: bytes in, messages out; no message longer than [`MAX_MESSAGE_LENGTH`] is ever kept. Bytes may arrive cut
 //! anywhere. After a malformed message the decoder goes on at the next `<`.
@@ -31,7 +31,7 @@ pub enum Request {
 
 /// What a server sends to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Reply {
+pub enum ServerReply {
     /// `< hi >`: the greeting.
     Hi,
     /// `< ok >`
@@ -145,7 +145,7 @@ impl Message for Request {
     }
 }
 
-impl Reply {
+impl ServerReply {
     /// `< error CLASS SECONDS >`: an error frame of the bus, by its class in Linux's messages (`CAN_ERR_*`).
     pub(super) fn error_frame(at: Instant, class: u32) -> Self {
         let micros = at.as_nanos() / 1_000;
@@ -153,7 +153,7 @@ impl Reply {
     }
 }
 
-impl Message for Reply {
+impl Message for ServerReply {
     fn parse(body: &str) -> Result<Self, Malformed> {
         let syntax = |expected| Malformed::Syntax { text: text::shown(body), expected };
         let mut words = body.split_ascii_whitespace();
@@ -211,7 +211,7 @@ fn parse_sendrtr<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Request
 }
 
 /// The bytes may stand together (as the daemon writes them) or apart (as its documentation does).
-fn parse_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Reply> {
+fn parse_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<ServerReply> {
     let id = parse_id(words.next()?)?;
     let at = text::parse_seconds(words.next()?)?;
     let mut data = [0; MAX_DATA_LENGTH];
@@ -224,14 +224,14 @@ fn parse_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Reply> {
             length += 1;
         }
     }
-    Some(Reply::Frame { at, frame: Frame::new(id, &data[..length]) })
+    Some(ServerReply::Frame { at, frame: Frame::new(id, &data[..length]) })
 }
 
-fn parse_rtr<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Reply> {
+fn parse_rtr<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<ServerReply> {
     let id = parse_id(words.next()?)?;
     let at = text::parse_seconds(words.next()?)?;
     let length = parse_length(words.next()?)?;
-    words.next().is_none().then(|| Reply::Frame { at, frame: Frame::remote(id, length as u8) })
+    words.next().is_none().then(|| ServerReply::Frame { at, frame: Frame::remote(id, length as u8) })
 }
 
 /// Eight digits make an extended identifier, fewer a standard one.
@@ -388,7 +388,7 @@ mod tests {
     #[test]
     fn messages_have_the_form_of_the_protocol_document() {
         let at = Instant::from_micros(23_424_242);
-        let reply = |text| Reply::Frame { at, frame: frame(text) };
+        let reply = |text| ServerReply::Frame { at, frame: frame(text) };
         assert_eq!(emitted(&reply("123#11223344")), b"< frame 123 23.424242 11223344 >");
         assert_eq!(emitted(&reply("080#")), b"< frame 080 23.424242  >");
         assert_eq!(emitted(&reply("1AAAAAAA#01F1")), b"< frame 1AAAAAAA 23.424242 01F1 >");
@@ -416,10 +416,10 @@ mod tests {
         assert_eq!(decode::<Request>(b"<open can0>"), [Ok(Request::Open("can0".into()))]);
         let at = Instant::from_micros(23_424_242);
         assert_eq!(
-            decode::<Reply>(b"< frame 123 23.424242 11 22 33 44 >"),
-            [Ok(Reply::Frame { at, frame: frame("123#11223344") })]
+            decode::<ServerReply>(b"< frame 123 23.424242 11 22 33 44 >"),
+            [Ok(ServerReply::Frame { at, frame: frame("123#11223344") })]
         );
-        assert_eq!(decode::<Reply>(b"< error 004 1.5 >"), [Ok(Reply::Error("004 1.5".into()))]);
+        assert_eq!(decode::<ServerReply>(b"< error 004 1.5 >"), [Ok(ServerReply::Error("004 1.5".into()))]);
     }
 
     #[test]
@@ -461,8 +461,8 @@ mod tests {
 
     #[test]
     fn an_error_text_cannot_forge_a_message() {
-        let bytes = emitted(&Reply::Error("no bus 'x >< ok >\n'".into()));
-        assert_eq!(decode::<Reply>(&bytes), [Ok(Reply::Error("no bus 'x '' ok ''".into()))]);
+        let bytes = emitted(&ServerReply::Error("no bus 'x >< ok >\n'".into()));
+        assert_eq!(decode::<ServerReply>(&bytes), [Ok(ServerReply::Error("no bus 'x '' ok ''".into()))]);
     }
 
     #[test]
@@ -470,9 +470,9 @@ mod tests {
         let mut random = Random::new(0x5EED_0001);
         for _ in 0..2_000 {
             let at = Instant::from_micros(random.next() >> 12);
-            let reply = Reply::Frame { at, frame: random.frame() };
+            let reply = ServerReply::Frame { at, frame: random.frame() };
             let request = Request::Send(random.frame());
-            assert_eq!(decode::<Reply>(&emitted(&reply)), [Ok(reply)]);
+            assert_eq!(decode::<ServerReply>(&emitted(&reply)), [Ok(reply)]);
             assert_eq!(decode::<Request>(&emitted(&request)), [Ok(request)]);
         }
     }
@@ -504,7 +504,7 @@ mod tests {
             let mut stream = random.salad(&words, 40);
             stream.extend_from_slice(b">\n< echo >");
             assert_eq!(decode::<Request>(&stream).last(), Some(&Ok(Request::Echo)));
-            assert_eq!(decode::<Reply>(&stream).last(), Some(&Ok(Reply::Echo)));
+            assert_eq!(decode::<ServerReply>(&stream).last(), Some(&Ok(ServerReply::Echo)));
         }
     }
 }

@@ -9,7 +9,7 @@ mod codec;
 mod session;
 
 pub use client::SocketcandBus;
-pub use codec::{Decoder, MAX_MESSAGE_LENGTH, Malformed, Message, Reply, Request};
+pub use codec::{Decoder, MAX_MESSAGE_LENGTH, Malformed, Message, Request, ServerReply};
 pub(crate) use session::SocketcandSession;
 
 /// The port that socketcand listens on by default.

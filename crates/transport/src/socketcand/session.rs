@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant};
 
-use super::codec::{Decoder, Message, Reply, Request};
+use super::codec::{Decoder, Message, Request, ServerReply};
 use crate::hub::{MAX_WAITING_REPLIES, Session};
 
 /// How long frames wait behind `< ok >` for a client that says nothing: long enough for a busy machine to schedule the
@@ -33,40 +33,40 @@ pub(crate) struct SocketcandSession {
     zero: Duration,
     mode: Mode,
     decoder: Decoder<Request>,
-    replies: VecDeque<Reply>,
+    replies: VecDeque<ServerReply>,
 }
 
 impl SocketcandSession {
     /// A session that serves a bus named `bus` and stamps frames with their time plus `zero`.
     pub(crate) fn new(bus: &str, zero: Duration) -> Self {
-        let replies = VecDeque::from([Reply::Hi]);
+        let replies = VecDeque::from([ServerReply::Hi]);
         Self { bus: bus.to_owned(), zero, mode: Mode::NoBus, decoder: Decoder::default(), replies }
     }
 
     fn handle(&mut self, request: Request) -> Option<Frame> {
         let reply = match (request, self.mode) {
-            (Request::Echo, _) => Reply::Echo,
+            (Request::Echo, _) => ServerReply::Echo,
             (Request::Open(bus), Mode::NoBus) if bus == self.bus => self.enter(Mode::Bcm),
             (Request::Open(bus), Mode::NoBus) => {
                 self.mode = Mode::Over;
-                Reply::Error(format!("no bus '{}' here; this server has '{}'", bus, self.bus))
+                ServerReply::Error(format!("no bus '{}' here; this server has '{}'", bus, self.bus))
             }
-            (Request::Open(_), _) => Reply::Error(format!("the bus '{}' is open already", self.bus)),
-            (_, Mode::NoBus) => Reply::Error(format!("no bus is open; begin with open {}", self.bus)),
+            (Request::Open(_), _) => ServerReply::Error(format!("the bus '{}' is open already", self.bus)),
+            (_, Mode::NoBus) => ServerReply::Error(format!("no bus is open; begin with open {}", self.bus)),
             (Request::RawMode, _) => self.enter(Mode::Raw),
             (Request::BcmMode, _) => self.enter(Mode::Bcm),
             (Request::Send(frame), _) => return Some(frame),
-            (Request::Unsupported(name), _) => {
-                Reply::Error(format!("'{name}' is not supported; this server has rawmode, send, sendrtr and echo"))
-            }
+            (Request::Unsupported(name), _) => ServerReply::Error(format!(
+                "'{name}' is not supported; this server has rawmode, send, sendrtr and echo"
+            )),
         };
         self.replies.push_back(reply);
         None
     }
 
-    fn enter(&mut self, mode: Mode) -> Reply {
+    fn enter(&mut self, mode: Mode) -> ServerReply {
         self.mode = mode;
-        Reply::Ok
+        ServerReply::Ok
     }
 }
 
@@ -79,7 +79,7 @@ impl Session for SocketcandSession {
                         return Some(frame);
                     }
                 }
-                Err(malformed) => self.replies.push_back(Reply::Error(malformed.to_string())),
+                Err(malformed) => self.replies.push_back(ServerReply::Error(malformed.to_string())),
             }
         }
         None
@@ -92,18 +92,18 @@ impl Session for SocketcandSession {
     fn next_reply(&mut self, out: &mut Vec<u8>) -> Option<Duration> {
         let reply = self.replies.pop_front()?;
         reply.emit(out);
-        Some(if reply == Reply::Ok { QUIET_AFTER_OK } else { Duration::ZERO })
+        Some(if reply == ServerReply::Ok { QUIET_AFTER_OK } else { Duration::ZERO })
     }
 
     fn deliver(&mut self, at: Instant, frame: &Frame, out: &mut Vec<u8>) {
         if self.is_listening() {
-            Reply::Frame { at: at + self.zero, frame: *frame }.emit(out);
+            ServerReply::Frame { at: at + self.zero, frame: *frame }.emit(out);
         }
     }
 
     fn deliver_error(&mut self, at: Instant, class: u32, out: &mut Vec<u8>) {
         if self.is_listening() {
-            Reply::error_frame(at + self.zero, class).emit(out);
+            ServerReply::error_frame(at + self.zero, class).emit(out);
         }
     }
 

@@ -195,7 +195,7 @@ impl Tune {
                     .next("omit it"));
             }
             let request = self.ramp_request(journal);
-            let found = Found::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?);
+            let found = TuneResult::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?);
             return Ok(Tuned { found, picture: None });
         }
         let (_, loops) = host::tune::loops_of(&drive)?;
@@ -211,7 +211,7 @@ impl Tune {
         let report = done?;
         released?;
         let picture = self.draw(&report.picture)?;
-        Ok(Tuned { found: Found::Gains(Box::new(report)), picture })
+        Ok(Tuned { found: TuneResult::Gains(Box::new(report)), picture })
     }
 
     fn of_capture(&self, path: &Path, context: &Context) -> Result<Tuned, Failure> {
@@ -227,7 +227,7 @@ impl Tune {
             report.notes.push(format!("it was captured of a {}, and node {} is a {model}", capture.model, self.node));
         }
         let picture = self.draw(&report.picture)?;
-        Ok(Tuned { found: Found::Captured(Box::new(report)), picture })
+        Ok(Tuned { found: TuneResult::Captured(Box::new(report)), picture })
     }
 
     /// Writes the picture to its file. The text of one that goes to standard output.
@@ -240,7 +240,7 @@ impl Tune {
 #[derive(Debug, serde::Serialize)]
 pub(crate) struct Tuned {
     #[serde(flatten)]
-    found: Found,
+    found: TuneResult,
     /// If it goes to standard output.
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
@@ -249,7 +249,7 @@ pub(crate) struct Tuned {
 /// What was proposed.
 #[derive(Debug, serde::Serialize)]
 #[serde(untagged)]
-enum Found {
+enum TuneResult {
     /// Of a drive with loops.
     Gains(Box<TuneReport>),
     /// Of a stepper without an encoder.
@@ -264,9 +264,9 @@ impl Report for Tuned {
             return picture.trim_end().to_owned();
         }
         match &self.found {
-            Found::Gains(report) => report.text(paint),
-            Found::Ramps(report) => report.text(paint),
-            Found::Captured(report) => report.text(paint),
+            TuneResult::Gains(report) => report.text(paint),
+            TuneResult::Ramps(report) => report.text(paint),
+            TuneResult::Captured(report) => report.text(paint),
         }
     }
 }

@@ -9,7 +9,7 @@ use can::BusFrame;
 use canopen::pdo::Direction;
 use canopen::{CobId, NmtState, NodeId};
 use master::Drive;
-use master::decode::{Decoded, Value};
+use master::decode::{Decoded, DecodedValue};
 use master::pdo::PdoConfig;
 use serde::Serialize;
 
@@ -197,7 +197,7 @@ impl PdoLine {
             let row = model.map_or_else(|| master::decode::common_row(record.mux), |model| model.row(record.mux));
             MappedField {
                 object: record.mux.to_string(),
-                name: Value::new(record.mux, &bytes[..length], model).name(),
+                name: DecodedValue::new(record.mux, &bytes[..length], model).name(),
                 value: decode(model, row, &bytes[..length]),
             }
         });

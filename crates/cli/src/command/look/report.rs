@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use canopen::NodeId;
-use host::network::report::{Capture, Made, NodeReport, Tuning};
+use host::network::report::{Made, NodeReport, ReportedCapture, Tuning};
 use master::decode::Decoder;
 use serde::Serialize;
 use transport::WallClock;
@@ -101,10 +101,10 @@ impl Report {
 }
 
 /// What a record has of a node.
-fn capture(path: &Path, node: NodeId, decoder: Decoder) -> Result<Capture, Failure> {
+fn capture(path: &Path, node: NodeId, decoder: Decoder) -> Result<ReportedCapture, Failure> {
     let recorded = read_record(path, decoder)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Capture::of_record(file, recorded, node).map_err(|reason| {
+    ReportedCapture::of_record(file, recorded, node).map_err(|reason| {
         Failure::bad_file(format!("the record {} has nothing of node {node}", path.display()))
             .because(reason)
             .next("give a record of this node, or omit it")

@@ -4,10 +4,10 @@ use canopen::NodeId;
 use plot::Figure;
 use recording::{Recorded, Subject, picture};
 
-use super::{Capture, CaptureFigure};
+use super::{CaptureFigure, ReportedCapture};
 use crate::test_motion::Figures;
 
-impl Capture {
+impl ReportedCapture {
     /// What a record has of a node; `file` is its name.
     ///
     /// # Errors

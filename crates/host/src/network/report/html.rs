@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Capture, Fact, NodeReport, TunedGain, TunedLoop, Tuning};
+use super::{Fact, NodeReport, ReportedCapture, TunedGain, TunedLoop, Tuning};
 use crate::network::faults::RememberedError;
 use words::{counted, escaped};
 
@@ -135,7 +135,7 @@ impl NodeReport {
     }
 }
 
-fn capture(out: &mut String, capture: &Capture) {
+fn capture(out: &mut String, capture: &ReportedCapture) {
     let row = |figure: &super::CaptureFigure| {
         let number = |value: f64| format!("{value:.3} {}", figure.unit).trim_end().to_owned();
         [escaped(&figure.name), number(figure.min), number(figure.mean), number(figure.max)]

@@ -77,7 +77,7 @@ pub struct NodeReport {
     /// Why the errors that it remembers were not seen.
     pub remembered_not_known: Option<String>,
     /// Records of runs.
-    pub captures: Vec<Capture>,
+    pub captures: Vec<ReportedCapture>,
     /// Tunings, before and after.
     pub tunings: Vec<Tuning>,
 }
@@ -135,7 +135,7 @@ pub struct PresentFault {
 
 /// A record of a run.
 #[derive(Clone, Debug, Serialize)]
-pub struct Capture {
+pub struct ReportedCapture {
     /// The file.
     pub file: String,
     /// What it has of this node.

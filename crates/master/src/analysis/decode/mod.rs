@@ -45,7 +45,7 @@ pub use pdo::Pdo;
 pub use sdo::Sdo;
 pub use step::{SdoStep, Side};
 pub use subject::ServiceKind;
-pub use value::{Value, statusword_words};
+pub use value::{DecodedValue, statusword_words};
 
 /// What one frame says.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use canopen::Mux;
 
-use super::value::Value;
+use super::value::DecodedValue;
 use super::{Decoded, SdoStep};
 
 /// The value of an object of a node, as a number in the unit of its row.
@@ -26,13 +26,13 @@ impl Decoded {
                 let fields = pdo.fields.iter().filter_map(|(record, raw)| {
                     let bytes = raw.to_le_bytes();
                     let length = usize::from(record.bits).div_ceil(8).min(bytes.len());
-                    Number::of(&Value::new(record.mux, &bytes[..length], pdo.model.map(|model| model.0)))
+                    Number::of(&DecodedValue::new(record.mux, &bytes[..length], pdo.model.map(|model| model.0)))
                 });
                 fields.collect()
             }
             Self::Sdo(sdo) => match &sdo.step {
                 SdoStep::ReadDone(mux, bytes) | SdoStep::WriteDone(mux, bytes) => {
-                    let value = Value::new(*mux, bytes, sdo.model.map(|model| model.0));
+                    let value = DecodedValue::new(*mux, bytes, sdo.model.map(|model| model.0));
                     Number::of(&value).into_iter().collect()
                 }
                 _ => Vec::new(),
@@ -43,7 +43,7 @@ impl Decoded {
 }
 
 impl Number {
-    fn of(value: &Value<'_>) -> Option<Self> {
+    fn of(value: &DecodedValue<'_>) -> Option<Self> {
         Some(Self { mux: value.mux, name: value.name(), value: value.number()?, unit: value.unit() })
     }
 }

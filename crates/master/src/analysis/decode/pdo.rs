@@ -11,7 +11,7 @@ use devices::Description;
 
 use super::common::standard_row;
 use super::node_models::NodeModels;
-use super::value::Value;
+use super::value::DecodedValue;
 use crate::core::{PdoMap, bits_of};
 use crate::identify::Model;
 use crate::pdo::PdoConfig;
@@ -103,7 +103,7 @@ impl fmt::Display for Pdo {
             f.write_str(if position == 0 { " " } else { ", " })?;
             let bytes = raw.to_le_bytes();
             let length = usize::from(object.bits).div_ceil(8).min(bytes.len());
-            write!(f, "{}", Value::new(object.mux, &bytes[..length], model))?;
+            write!(f, "{}", DecodedValue::new(object.mux, &bytes[..length], model))?;
         }
         match self.mapped_bytes {
             None => {

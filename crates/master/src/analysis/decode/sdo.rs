@@ -6,7 +6,7 @@ use canopen::{AbortCode, Mux, NodeId};
 
 use super::block::{Block, BlockStep};
 use super::step::{MAX_OBJECT, SdoStep, Side};
-use super::value::{Value, write_name};
+use super::value::{DecodedValue, write_name};
 use crate::identify::Model;
 
 /// One frame of an SDO transfer.
@@ -155,7 +155,7 @@ impl Sdo {
     /// The whole transfer in words, from the frame that ends it: what was read or written, or why not. `None` before.
     pub fn transfer(&self) -> Option<String> {
         let Self { node, step, .. } = self;
-        let value = |mux, bytes| Value::new(mux, bytes, self.model.map(|model| model.0));
+        let value = |mux, bytes| DecodedValue::new(mux, bytes, self.model.map(|model| model.0));
         match step {
             SdoStep::ReadDone(mux, bytes) => Some(format!("SDO node {node}: read {}", value(*mux, bytes))),
             SdoStep::WriteDone(mux, bytes) => Some(format!("SDO node {node}: wrote {}", value(*mux, bytes))),
@@ -175,8 +175,8 @@ impl fmt::Display for Sdo {
                 f.write_str("read ")?;
                 named(f, *mux)
             }
-            SdoStep::ReadDone(mux, bytes) => Value::new(*mux, bytes, model).fmt(f),
-            SdoStep::Write(mux, bytes) => write!(f, "write {}", Value::new(*mux, bytes, model)),
+            SdoStep::ReadDone(mux, bytes) => DecodedValue::new(*mux, bytes, model).fmt(f),
+            SdoStep::Write(mux, bytes) => write!(f, "write {}", DecodedValue::new(*mux, bytes, model)),
             SdoStep::WriteDone(mux, _) => {
                 f.write_str("done: write ")?;
                 named(f, *mux)

@@ -9,7 +9,7 @@ use super::common::{common_name, common_row, common_type};
 
 /// The bytes of one object, with what is known about it. Prints as `6041h:00 statusword = 0237h (Operation enabled)`.
 #[derive(Clone)]
-pub struct Value<'a> {
+pub struct DecodedValue<'a> {
     /// Which object.
     pub mux: Mux,
     /// Its bytes, little endian.
@@ -19,7 +19,7 @@ pub struct Value<'a> {
     model: Option<&'static Description>,
 }
 
-impl<'a> Value<'a> {
+impl<'a> DecodedValue<'a> {
     /// The bytes of an object, looked up in the model's table, or in what all models agree on.
     pub fn new(mux: Mux, bytes: &'a [u8], model: Option<&'static Description>) -> Self {
         Self { mux, bytes, entry: find(model, mux), model }
@@ -63,13 +63,13 @@ impl<'a> Value<'a> {
     }
 }
 
-impl fmt::Debug for Value<'_> {
+impl fmt::Debug for DecodedValue<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Value({self})")
+        write!(f, "DecodedValue({self})")
     }
 }
 
-impl fmt::Display for Value<'_> {
+impl fmt::Display for DecodedValue<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write_name(f, self.mux, self.model)?;
         f.write_str(" = ")?;
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn an_object_with_another_form_in_tpdos_is_read_by_its_length() {
         let joint = Some(&devices::mjoint::M4230E17B50);
-        let speed = |bytes| Value::new(Mux::new(0x606C, 0), bytes, joint).to_string();
+        let speed = |bytes| DecodedValue::new(Mux::new(0x606C, 0), bytes, joint).to_string();
         assert_eq!(speed(&[0x90, 0xE8]), "606Ch:00 velocity_actual_value = -6000 [0.1 r/min]");
         assert_eq!(speed(&[0xA8, 0xFD, 0xFF, 0xFF]), "606Ch:00 velocity_actual_value = -600 [r/min]");
     }

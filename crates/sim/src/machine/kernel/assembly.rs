@@ -15,7 +15,7 @@ use plant::rig::RigModel;
 use plant::shaft::Motion;
 use plant::{Angle, FreeRun, Motor, Rig};
 
-use super::quantity::Quantity;
+use super::quantity::QuantityRange;
 use super::realism::{Noise, Realism};
 use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 
@@ -23,15 +23,15 @@ use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 pub(crate) const AMBIENT_C: f64 = 25.0;
 
 /// From what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
-const SUPPLY_LIMIT: Quantity =
-    Quantity { what: "limit of the supply", expected: "0.01 to 1000 A", least: 0.01, greatest: 1000.0 };
+const SUPPLY_LIMIT: QuantityRange =
+    QuantityRange { what: "limit of the supply", expected: "0.01 to 1000 A", least: 0.01, greatest: 1000.0 };
 
 /// From a few centimetres of thick wire to what hardly lets a drive start.
-const SUPPLY_RESISTANCE: Quantity =
-    Quantity { what: "resistance of the supply", expected: "0.001 to 100 ohm", least: 0.001, greatest: 100.0 };
+const SUPPLY_RESISTANCE: QuantityRange =
+    QuantityRange { what: "resistance of the supply", expected: "0.001 to 100 ohm", least: 0.001, greatest: 100.0 };
 
-const TEMPERATURE: Quantity =
-    Quantity { what: "temperature", expected: "-55 to 200 °C", least: -55.0, greatest: 200.0 };
+const TEMPERATURE: QuantityRange =
+    QuantityRange { what: "temperature", expected: "-55 to 200 °C", least: -55.0, greatest: 200.0 };
 
 /// What is asked of one shaft to place things at it.
 #[derive(Clone, Copy, Debug)]
@@ -68,13 +68,14 @@ pub trait Assembly: Clone + Send + 'static {
     /// Bus voltage below which it stops; assumed likewise.
     const STOPS_BELOW_V: f64 = 9.0;
     /// What the supply can be set to.
-    const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
+    const SUPPLY_VOLTAGE: QuantityRange =
+        QuantityRange { what: "supply", expected: "0 to 100 V", least: 0.0, greatest: 100.0 };
     /// What can be asked of the load at the output shaft.
-    const LOAD_TORQUE: Quantity =
-        Quantity { what: "load torque", expected: "-1000 to 1000 N·m", least: -1000.0, greatest: 1000.0 };
+    const LOAD_TORQUE: QuantityRange =
+        QuantityRange { what: "load torque", expected: "-1000 to 1000 N·m", least: -1000.0, greatest: 1000.0 };
     /// What can be added at the output shaft.
-    const LOAD_INERTIA: Quantity =
-        Quantity { what: "load inertia", expected: "0 to 1000 kg·m²", least: 0.0, greatest: 1000.0 };
+    const LOAD_INERTIA: QuantityRange =
+        QuantityRange { what: "load inertia", expected: "0 to 1000 kg·m²", least: 0.0, greatest: 1000.0 };
 
     /// The model's name as users type it, where one assembly serves several.
     fn model(&self) -> &'static str {

@@ -6,34 +6,38 @@ use plant::mechanics::Load;
 
 use super::Machine;
 use super::assembly::Assembly;
-use super::quantity::Quantity;
+use super::quantity::QuantityRange;
 use super::switch::stretch;
 use crate::stimulus::{Friction, LoadKind, LoadPart, SwitchRange};
 use crate::{Refused, VirtualDrive};
 
-const FRICTION: Quantity = Quantity { what: "friction", expected: "0 to 1000 N·m", least: 0.0, greatest: 1000.0 };
-const VISCOUS: Quantity =
-    Quantity { what: "viscous friction", expected: "0 to 1000 N·m·s/rad", least: 0.0, greatest: 1000.0 };
-const STRIBECK: Quantity =
-    Quantity { what: "Stribeck velocity", expected: "0.0001 to 100 rad/s", least: 1e-4, greatest: 100.0 };
-const MASS: Quantity = Quantity { what: "mass", expected: "0 to 10000 kg", least: 0.0, greatest: 10_000.0 };
-const RADIUS: Quantity = Quantity { what: "radius of the drum", expected: "-10 to 10 m", least: -10.0, greatest: 10.0 };
-const SPRING: Quantity =
-    Quantity { what: "stiffness of the spring", expected: "0 to 1e6 N·m/rad", least: 0.0, greatest: 1e6 };
-const REST: Quantity =
-    Quantity { what: "angle of rest", expected: "-360000 to 360000 degrees", least: -3.6e5, greatest: 3.6e5 };
-const STOP: Quantity =
-    Quantity { what: "stiffness of the stops", expected: "1 to 1e7 N·m/rad", least: 1.0, greatest: 1e7 };
-const DAMPING: Quantity =
-    Quantity { what: "damping of the stops", expected: "0 to 1e5 N·m·s/rad", least: 0.0, greatest: 1e5 };
-const FAN_TORQUE: Quantity =
-    Quantity { what: "torque of the fan", expected: "0 to 1000 N·m", least: 0.0, greatest: 1000.0 };
-const FAN_SPEED: Quantity =
-    Quantity { what: "speed of the fan", expected: "1 to 100000 r/min", least: 1.0, greatest: 1e5 };
-const RATIO: Quantity = Quantity { what: "ratio of the gear", expected: "0.01 to 1000", least: 0.01, greatest: 1000.0 };
-const BACKLASH: Quantity = Quantity { what: "backlash", expected: "0 to 90 degrees", least: 0.0, greatest: 90.0 };
-const GEAR: Quantity =
-    Quantity { what: "stiffness of the gear", expected: "1 to 1e7 N·m/rad", least: 1.0, greatest: 1e7 };
+const FRICTION: QuantityRange =
+    QuantityRange { what: "friction", expected: "0 to 1000 N·m", least: 0.0, greatest: 1000.0 };
+const VISCOUS: QuantityRange =
+    QuantityRange { what: "viscous friction", expected: "0 to 1000 N·m·s/rad", least: 0.0, greatest: 1000.0 };
+const STRIBECK: QuantityRange =
+    QuantityRange { what: "Stribeck velocity", expected: "0.0001 to 100 rad/s", least: 1e-4, greatest: 100.0 };
+const MASS: QuantityRange = QuantityRange { what: "mass", expected: "0 to 10000 kg", least: 0.0, greatest: 10_000.0 };
+const RADIUS: QuantityRange =
+    QuantityRange { what: "radius of the drum", expected: "-10 to 10 m", least: -10.0, greatest: 10.0 };
+const SPRING: QuantityRange =
+    QuantityRange { what: "stiffness of the spring", expected: "0 to 1e6 N·m/rad", least: 0.0, greatest: 1e6 };
+const REST: QuantityRange =
+    QuantityRange { what: "angle of rest", expected: "-360000 to 360000 degrees", least: -3.6e5, greatest: 3.6e5 };
+const STOP: QuantityRange =
+    QuantityRange { what: "stiffness of the stops", expected: "1 to 1e7 N·m/rad", least: 1.0, greatest: 1e7 };
+const DAMPING: QuantityRange =
+    QuantityRange { what: "damping of the stops", expected: "0 to 1e5 N·m·s/rad", least: 0.0, greatest: 1e5 };
+const FAN_TORQUE: QuantityRange =
+    QuantityRange { what: "torque of the fan", expected: "0 to 1000 N·m", least: 0.0, greatest: 1000.0 };
+const FAN_SPEED: QuantityRange =
+    QuantityRange { what: "speed of the fan", expected: "1 to 100000 r/min", least: 1.0, greatest: 1e5 };
+const RATIO: QuantityRange =
+    QuantityRange { what: "ratio of the gear", expected: "0.01 to 1000", least: 0.01, greatest: 1000.0 };
+const BACKLASH: QuantityRange =
+    QuantityRange { what: "backlash", expected: "0 to 90 degrees", least: 0.0, greatest: 90.0 };
+const GEAR: QuantityRange =
+    QuantityRange { what: "stiffness of the gear", expected: "1 to 1e7 N·m/rad", least: 1.0, greatest: 1e7 };
 
 /// Assumed: the gear of a machine winds up by a tenth of a degree under 10 N·m, as a light spur gear's shafts do.
 const GEAR_STIFFNESS_NM_RAD: f64 = 5000.0;

@@ -3,7 +3,7 @@
 use crate::Refused;
 
 /// A quantity that a command sets, and what makes sense for it.
-pub struct Quantity {
+pub struct QuantityRange {
     /// Its name.
     pub what: &'static str,
     /// The range with its unit, for people.
@@ -14,7 +14,7 @@ pub struct Quantity {
     pub greatest: f64,
 }
 
-impl Quantity {
+impl QuantityRange {
     /// `value` if it is a number in the range.
     pub fn check(&self, value: f64) -> Result<f64, Refused> {
         if (self.least..=self.greatest).contains(&value) {

@@ -2,15 +2,17 @@
 
 use drives::mjoint::pulses::PulseInput;
 
-use crate::machine::kernel::quantity::Quantity;
+use crate::machine::kernel::quantity::QuantityRange;
 use crate::{PulseTrain, Refused};
 
 /// Highest input frequency ("Maximum input pulse frequency 500 KHz").
-const FREQUENCY: Quantity =
-    Quantity { what: "frequency", expected: "above 0 to 500000 Hz", least: f64::MIN_POSITIVE, greatest: 500e3 };
-const DUTY_CYCLE: Quantity = Quantity { what: "duty cycle", expected: "0 to 100 %", least: 0.0, greatest: 100.0 };
+const FREQUENCY: QuantityRange =
+    QuantityRange { what: "frequency", expected: "above 0 to 500000 Hz", least: f64::MIN_POSITIVE, greatest: 500e3 };
+const DUTY_CYCLE: QuantityRange =
+    QuantityRange { what: "duty cycle", expected: "0 to 100 %", least: 0.0, greatest: 100.0 };
 /// Of a clock's level: at most one in a control period, which is how often the drive looks at DIR.
-const CHANGES: Quantity = Quantity { what: "changes of level", expected: "0 to 20000 Hz", least: 0.0, greatest: 20e3 };
+const CHANGES: QuantityRange =
+    QuantityRange { what: "changes of level", expected: "0 to 20000 Hz", least: 0.0, greatest: 20e3 };
 
 /// A pulse generator wired to PU and DIR.
 #[derive(Clone, Copy, Debug, Default)]

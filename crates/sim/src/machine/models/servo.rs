@@ -29,7 +29,7 @@ use super::order::{Order, OrderError};
 use super::{kept, order};
 use crate::machine::kernel::Machine;
 use crate::machine::kernel::assembly::{AMBIENT_C, Assembly, with_demand};
-use crate::machine::kernel::quantity::Quantity;
+use crate::machine::kernel::quantity::QuantityRange;
 use crate::machine::kernel::realism::{
     HUB_COGGING, LARGE_CURRENT_STEP_A, Noise, Realism, TEMPERATURE_STEP_C, VOLTAGE_STEP_V, with_dead_time,
 };
@@ -260,7 +260,8 @@ impl Assembly for ServoBench {
     const INPUTS: &'static [&'static str] = &INPUTS;
     const STARTS_AT_V: f64 = 24.0;
     const STOPS_BELOW_V: f64 = 18.0;
-    const SUPPLY_VOLTAGE: Quantity = Quantity { what: "supply", expected: "0 to 450 V", least: 0.0, greatest: 450.0 };
+    const SUPPLY_VOLTAGE: QuantityRange =
+        QuantityRange { what: "supply", expected: "0 to 450 V", least: 0.0, greatest: 450.0 };
 
     fn model(&self) -> &'static str {
         self.model.name

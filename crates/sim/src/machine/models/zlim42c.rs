@@ -29,7 +29,7 @@ use plant::supply::SupplyData;
 use super::order::{Order, OrderError, baud_rate};
 use crate::machine::kernel::Machine;
 use crate::machine::kernel::assembly::{AMBIENT_C, Assembly};
-use crate::machine::kernel::quantity::Quantity;
+use crate::machine::kernel::quantity::QuantityRange;
 use crate::machine::kernel::realism::{Noise, Realism, SMALL_CURRENT_STEP_A, VOLTAGE_STEP_V, with_dead_time};
 use crate::{Component, Levels, Refused, Report, TemperatureSensor, VirtualDrive};
 
@@ -207,10 +207,10 @@ impl<const LENGTH_MM: u16> Assembly for Stepper<LENGTH_MM> {
     // 20 V are those of the supply, of which cable and bus take some tenths when the motor draws its most.
     const STARTS_AT_V: f64 = 19.8;
     const STOPS_BELOW_V: f64 = StepperMotorModel::ZLIM42_C_70.rig.supply.consumption_from_v;
-    const LOAD_TORQUE: Quantity =
-        Quantity { what: "load torque", expected: "-100 to 100 N·m", least: -100.0, greatest: 100.0 };
-    const LOAD_INERTIA: Quantity =
-        Quantity { what: "load inertia", expected: "0 to 100 kg·m²", least: 0.0, greatest: 100.0 };
+    const LOAD_TORQUE: QuantityRange =
+        QuantityRange { what: "load torque", expected: "-100 to 100 N·m", least: -100.0, greatest: 100.0 };
+    const LOAD_INERTIA: QuantityRange =
+        QuantityRange { what: "load inertia", expected: "0 to 100 kg·m²", least: 0.0, greatest: 100.0 };
 
     fn hardware(&self) -> Hardware {
         Hardware { dip_address: self.dip_address, eeprom: *self.image }
