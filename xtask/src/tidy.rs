@@ -12,6 +12,7 @@ mod exceptions;
 mod finding;
 mod glossary;
 mod manifests;
+mod names;
 mod paths;
 mod sizes;
 mod source;
@@ -106,6 +107,7 @@ fn findings() -> Result<Vec<Finding>, String> {
     // A type is written in one: `MovedAxis`.
     found.extend(glossary::of_page(&glossary, |word| in_use(word) || in_use(&word.replace(' ', ""))));
     found.extend(circles::in_crates(&sources));
+    found.extend(names::repeated(&sources));
     found.extend(circles::in_packages(&python));
     let mut found = exceptions::apply(found, exceptions::EXCEPTIONS);
     found.sort();
