@@ -25,8 +25,8 @@ pub(crate) fn step() -> Tally {
     if without_axe.is_some() {
         arguments.extend(["--skip", "studio_browser::axe::"]);
     }
-    // One browser at a time: each takes some hundred megabytes and a core.
-    let how = How { programs: 1, threads: 1, arguments: &arguments };
+    // Two browsers at a time: each takes some hundred megabytes and, half of its time, a core.
+    let how = How { programs: 1, threads: 2, arguments: &arguments };
     let tally = test_programs::build_and_run(SCHEMA_AND_BROWSER, how);
     match without_axe {
         Some(reason) if tally.failed == 0 => {
