@@ -142,8 +142,12 @@ fn what_is_on_a_bus_is_shown_as_it_comes() {
 #[test]
 fn a_node_that_is_stopped_and_sends_no_heartbeat_is_explained_with_how_to_start_it() {
     let bench = VirtualBus::of(&["zlac8030l@4", "m4230e17b50@1"]).with(&["--model", "4=zlac8030l"]);
+    // Not in the current folder, where another run of these tests may have its own.
+    let folder = scratch("stopped_silent");
+    let journal = folder.path("node4.journal");
+    let apply = ["pdo", "apply", "4", "tpdo1=statusword", "--type", "255", "--event", "100ms", "--journal", &journal];
     // Pre-operational after its boot-up, and 1017h is 0: no one can hear in which state it is (CiA 301, 7.3.2.2.1: no PDO).
-    bench.done(&["pdo", "apply", "4", "tpdo1=statusword", "--type", "255", "--event", "100ms"]);
+    bench.done(&apply);
     let silent = bench.done(&["explain", "4"]).out;
     assert!(silent.contains("pdo_missing") && silent.contains("operational only: ferrodrive nmt 4 start"), "{silent}");
     bench.done(&["nmt", "4", "start"]);
