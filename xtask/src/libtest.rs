@@ -70,7 +70,10 @@ impl Reader {
     pub(crate) fn end(mut self, name: &str, ended: Result<bool, String>) -> (Tally, Vec<Timed>) {
         match ended {
             Ok(true) => {}
-            Ok(false) if self.tally.failed > 0 => self.tally.note = self.failed.join(", "),
+            Ok(false) if self.tally.failed > 0 => {
+                self.tally.note = self.failed.join(", ");
+                self.tally.said = said_by_failed_tests(&self.shown);
+            }
             Ok(false) => self.tally.add(&Tally::failed(format!("{name} ended badly: read the lines above"))),
             Err(error) => self.tally.add(&Tally::failed(error)),
         }
@@ -102,6 +105,18 @@ pub(crate) fn failed_test(line: &str) -> Option<String> {
     outcome.starts_with("FAILED").then(|| name.to_owned())
 }
 
+/// Of the lines of a program, those between the heading of the first failed test and the list of their names; without the
+/// frames of backtraces.
+fn said_by_failed_tests(lines: &[String]) -> Vec<String> {
+    let heading = |line: &&String| line.starts_with("---- ");
+    let from_first = lines.iter().skip_while(|line| !heading(line)).take_while(|line| *line != "failures:");
+    let is_frame = |line: &str| {
+        let words = line.strip_prefix("  ").map(str::trim_start).unwrap_or_default();
+        words.starts_with("at ") || words.split_once(": ").is_some_and(|(number, _)| number.parse::<u32>().is_ok())
+    };
+    from_first.filter(|line| !is_frame(line)).cloned().collect()
+}
+
 /// The time of a test, if reported: `test frame::a_law ... ok <0.123s>`.
 fn time_of(line: &str) -> Option<Timed> {
     let (name, outcome) = line.strip_prefix("test ")?.split_once(" ... ")?;
@@ -130,6 +145,31 @@ mod tests {
         count("test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 4 filtered out", &mut tally);
         count("running 5 tests", &mut tally);
         assert_eq!((tally.passed, tally.failed, tally.skipped), (15, 2, 1));
+    }
+
+    #[test]
+    fn what_failed_tests_said_is_kept_without_their_backtraces() {
+        let printed = [
+            "test a ... FAILED",
+            "failures:",
+            "---- a stdout ----",
+            "thread 'a' panicked at src/a.rs:3:5:",
+            "1: not 2",
+            "stack backtrace:",
+            "  17: tokio::runtime::block_on",
+            "             at ./src/a.rs:3:5",
+            "failures:",
+            "    a",
+            "test result: FAILED. 0 passed; 1 failed; 0 ignored",
+        ];
+        let mut read = Reader::default();
+        printed.iter().for_each(|line| read.line(line));
+        let (tally, _) = read.end("a", Ok(false));
+        assert_eq!((tally.failed, tally.note.as_str()), (1, "a"));
+        assert_eq!(
+            tally.said,
+            ["---- a stdout ----", "thread 'a' panicked at src/a.rs:3:5:", "1: not 2", "stack backtrace:"]
+        );
     }
 
     #[test]

@@ -8,11 +8,17 @@ use crate::tally::Tally;
 /// A step that has run: its name, how long it took, what it found.
 pub(crate) type StepRow = (&'static str, Duration, Tally);
 
-/// Prints the table; success if nothing failed.
+/// How many lines of what the failed tests of a step printed are shown again.
+const SAID_AGAIN: usize = 60;
+
+/// Prints what failed tests said, and the table; success if nothing failed.
 pub(crate) fn conclude(rows: &[StepRow], took: Duration) -> ExitCode {
+    for (name, _, tally) in rows {
+        tally.said.iter().take(SAID_AGAIN).for_each(|line| println!("{name:10} | {line}"));
+    }
     println!("\n{:10} {:8} {:>8} {:>7} {:>7} {:>8}  note", "step", "result", "time", "passed", "failed", "skipped");
     for (name, took, tally) in rows {
-        let Tally { passed, failed, skipped, note } = tally;
+        let Tally { passed, failed, skipped, note, .. } = tally;
         println!("{name:10} {:8} {:>8} {passed:>7} {failed:>7} {skipped:>8}  {note}", tally.verdict(), seconds(*took));
     }
     println!("{:10} {:8} {:>8}\n", "all", sum(rows).verdict(), seconds(took));
