@@ -15,9 +15,10 @@ addEventListener("pointerdown", (event) => open && !open.root.contains(event.tar
 
 /**
  * An element with `value` and `disabled`, which fires "change" when an option is chosen. `offer` sets its options: `{ value, text,
- * disabled, title }`; the value stays if it is still among them, else it is the first one's. `onopen` is called before its list is shown.
+ * disabled, title }`; the value stays if it is still among them, else it is the first one's. `onopen` is called, and what it
+ * promises awaited, before its list is shown: no line moves away from under the pointer.
  */
-export function choice(id, label, options = [], { value = undefined, onopen = () => {}, onchange = () => {} } = {}) {
+export function choice(id, label, options = [], { value = undefined, onopen = async () => {}, onchange = () => {} } = {}) {
   const shown = h("span", { class: "choice-text" });
   const button = h("button", { type: "button", role: "combobox", "aria-haspopup": "listbox", "aria-expanded": "false", "aria-label": label, onclick: () => (mine === open ? close() : show()) }, shown);
   const list = h("ul", { role: "listbox", "aria-label": label, hidden: true });
@@ -42,9 +43,10 @@ export function choice(id, label, options = [], { value = undefined, onopen = ()
     else button.removeAttribute("aria-activedescendant");
   }
 
-  function show() {
+  async function show() {
     closeChoice();
-    onopen();
+    await onopen();
+    closeChoice();
     open = mine;
     active = Math.max(0, place());
     button.setAttribute("aria-expanded", "true");

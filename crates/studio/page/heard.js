@@ -40,16 +40,15 @@ function take(body) {
 /** Buttons that choose objects, and remove them. */
 export function heardChooser() {
   const first = { value: "", text: "Add an object …" };
-  const list = choice("scope-object", "Add an object from the bus", [first], { onopen: load, onchange: () => add(list.value) });
+  const list = choice("scope-object", "Add an object from the bus", [first], { onopen: () => (loading ??= read()), onchange: () => add(list.value) });
   const shown = h("span", { class: "chooser", role: "group", "aria-label": "Objects shown" });
   const status = h("span", { class: "quiet", role: "status" });
   let known = [];
-  let loading = false;
+  /** The answer that is awaited. */
+  let loading = null;
   let missed = 0;
 
-  async function load() {
-    if (loading) return;
-    loading = true;
+  async function read() {
     try {
       known = (await fetchSeries({})).series.filter(({ object }) => !chosen.has(object));
       const title = ({ object, name, unit, count }) => `${object} ${name ?? ""}${unit ? ` [${unit}]` : ""}, ${count} recently`;
@@ -58,7 +57,7 @@ export function heardChooser() {
     } catch (error) {
       setText(status, error.message);
     }
-    loading = false;
+    loading = null;
   }
 
   async function add(object) {

@@ -1,3 +1,5 @@
+use std::future::poll_fn;
+use std::pin::pin;
 use std::time::Duration;
 
 use can::Instant;
@@ -15,7 +17,7 @@ use crate::network::{Network, Node, join_all};
 const WINDOW: usize = 32;
 
 /// How long a node is given to answer: drives answer within a few milliseconds, a window of requests takes 8 more
-/// at 500 kbit/s and 40 more at 100 kbit/s.
+/// at 500 kbit/s and 40 more at 100 kbit/s. The next window is asked then, however long the answers of this one are waited for.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// How late an answer may come to a scan that asks with a shorter time-out: behind a gateway or a radio link, or of a program on a
@@ -165,21 +167,29 @@ pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
 }
 
 impl Network {
-    /// Asks all 127 node-IDs who they are. `progress` is given how many have been asked.
+    /// Asks all 127 node-IDs who they are: 32 at a time, the next after [`SCAN_TIMEOUT`], or after `timeout` where that is shorter.
+    /// `progress` is given how many have been asked.
     ///
     /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile; one that boots
     /// meanwhile is asked again, and so is one whose answer came after `timeout`, up to half a second late: with more patience.
     pub async fn scan(&self, timeout: Duration, mut progress: impl FnMut(usize)) -> Vec<Found> {
-        let nodes: Vec<NodeId> = NodeId::all().collect();
-        let mut found = Vec::new();
-        let mut asked = 0;
         let began = self.now();
-        for window in nodes.chunks(WINDOW) {
-            let asking = window.iter().map(|id| self.look_at(*id, timeout));
-            found.extend(join_all(asking.collect::<Vec<_>>()).await.into_iter().flatten());
-            asked += window.len();
-            progress(asked);
-        }
+        let turn = |place: usize| timeout.min(SCAN_TIMEOUT) * (place / WINDOW) as u32;
+        let looks = NodeId::all().enumerate().map(async |(place, id)| {
+            self.sleep(turn(place)).await;
+            self.look_at(id, timeout).await
+        });
+        let mut looks = pin!(join_all(looks));
+        let all = NodeId::all().count();
+        let mut asked = (WINDOW..all).step_by(WINDOW).chain([all]).peekable();
+        // It is polled when a window has its turn, too.
+        let looks = poll_fn(|context| {
+            while let Some(count) = asked.next_if(|count| began + turn(count - 1) <= self.now()) {
+                progress(count);
+            }
+            looks.as_mut().poll(context)
+        });
+        let mut found: Vec<Found> = looks.await.into_iter().flatten().collect();
         // An answer that comes after its time-out shows that its node is there.
         self.sleep(LATE_ANSWER.saturating_sub(timeout)).await;
         self.ask_late_comers(&mut found, began, timeout.max(LATE_ANSWER)).await;

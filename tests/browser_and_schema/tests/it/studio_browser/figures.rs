@@ -121,7 +121,8 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     drop(Studio::start(&["--bus", &bus.address]));
     // A measurement over time.
     let address_ms = start.elapsed().as_secs_f64() * 1e3;
-    let stage = Stage::open_on("figures", &["--bus", &bus.address]).await;
+    // A scan waits as long for nodes that are not there.
+    let stage = Stage::open_on("figures", &["--timeout", "15s", "--bus", &bus.address]).await;
     let picture_ms = number(&stage, FIRST_PICTURE).await;
     done(&["--bus", &bus.address, "nmt", "all", "start"]);
     stage.click("#tabs [data-name=scope]").await;
