@@ -98,14 +98,14 @@ fn flattened(len: usize, lines: &[usize], mut spectrum: Vec<Complex<f64>>) -> Ve
         lines.iter().zip(&spectrum).for_each(|(line, value)| bins[*line] = *value);
         // Both fail where a length is wrong, and all are their own.
         let done = inverse.process(&mut bins, &mut values);
-        debug_assert!(done.is_ok());
+        assert!(done.is_ok(), "{done:?}");
         let peak = values.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
         if peak < best.0 {
             best = (peak, values.iter().map(|value| value / peak).collect());
         }
         values.iter_mut().for_each(|value| *value = value.clamp(-CLIPPED * peak, CLIPPED * peak));
         let done = forward.process(&mut values, &mut bins);
-        debug_assert!(done.is_ok());
+        assert!(done.is_ok(), "{done:?}");
         for (line, value) in lines.iter().zip(&mut spectrum) {
             *value = Complex::from_polar(value.norm(), bins[*line].arg());
         }

@@ -227,7 +227,7 @@ impl<'a> Spectra<'a> {
         let mut output = self.fft.make_output_vec();
         // It fails where a length is wrong, and both are its own.
         let done = self.fft.process(&mut input, &mut output);
-        debug_assert!(done.is_ok());
+        assert!(done.is_ok(), "{done:?}");
         output
     }
 

@@ -17,8 +17,12 @@ use crate::network::{Network, Node, join_all};
 const WINDOW: usize = 32;
 
 /// How long a node is given to answer: drives answer within a few milliseconds, a window of requests takes 8 more
-/// at 500 kbit/s and 40 more at 100 kbit/s. The next window is asked then, however long the answers of this one are waited for.
+/// at 500 kbit/s and 40 more at 100 kbit/s.
 pub const SCAN_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Longest time between two windows, however long the answers are waited for: together they take as long as a drive that was just
+/// switched on needs to boot, about a second, so that it is heard meanwhile.
+const MOST_APART: Duration = Duration::from_millis(500);
 
 /// How late an answer may come to a scan that asks with a shorter time-out: behind a gateway or a radio link, or of a program on a
 /// busy computer, it takes a few tenths of a second. A guess of what a user waits for.
@@ -167,14 +171,14 @@ pub(crate) async fn has(node: &Node, mux: Mux) -> Result<bool, Error> {
 }
 
 impl Network {
-    /// Asks all 127 node-IDs who they are: 32 at a time, the next after [`SCAN_TIMEOUT`], or after `timeout` where that is shorter.
-    /// `progress` is given how many have been asked.
+    /// Asks all 127 node-IDs who they are, 32 at a time, the next after `timeout` or half a second, whichever is shorter. `progress`
+    /// is given how many have been asked.
     ///
     /// Nodes that answer no SDO are found by their boot-up or heartbeat messages, if any came before or meanwhile; one that boots
     /// meanwhile is asked again, and so is one whose answer came after `timeout`, up to half a second late: with more patience.
     pub async fn scan(&self, timeout: Duration, mut progress: impl FnMut(usize)) -> Vec<Found> {
         let began = self.now();
-        let turn = |place: usize| timeout.min(SCAN_TIMEOUT) * (place / WINDOW) as u32;
+        let turn = |place: usize| timeout.min(MOST_APART) * (place / WINDOW) as u32;
         let looks = NodeId::all().enumerate().map(async |(place, id)| {
             self.sleep(turn(place)).await;
             self.look_at(id, timeout).await

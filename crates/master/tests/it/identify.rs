@@ -208,7 +208,7 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     assert!(state.fault_code.is_some_and(|code| code != 0));
 }
 
-/// A drive takes about a second to boot, in which it is deaf; the scan asks it in that second, and waits a second for each.
+/// A drive takes about a second to boot, in which it is deaf; the scan comes to it in its first half second.
 #[test]
 fn a_node_that_boots_during_a_scan_is_asked_once_it_has() {
     let mut world = World::new(Bitrate::K500, 5);
@@ -218,13 +218,13 @@ fn a_node_that_boots_during_a_scan_is_asked_once_it_has() {
     for number in [SERVO, STEPPER] {
         world.add_drive(number, Box::new(zlac8030l(number, K500))).unwrap();
     }
-    let found = block_on(&mut world, network.scan(Duration::from_secs(1), |_| {})).unwrap();
+    let found = block_on(&mut world, network.scan(Duration::from_millis(500), |_| {})).unwrap();
     let nodes: Vec<_> = found.iter().map(|found| found.node.raw()).collect();
     assert_eq!(nodes, [STEPPER, SERVO]);
     assert!(found.iter().all(|found| found.identity.is_some()), "{found:?}");
     // One that was known before, and boots again.
     network.node(node(SERVO)).nmt(canopen::NmtCommand::ResetNode);
-    let found = block_on(&mut world, network.scan(Duration::from_secs(1), |_| {})).unwrap();
+    let found = block_on(&mut world, network.scan(Duration::from_millis(500), |_| {})).unwrap();
     assert!(found.len() == 2 && found.iter().all(|found| found.identity.is_some()), "{found:?}");
 }
 

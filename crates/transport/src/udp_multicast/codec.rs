@@ -90,7 +90,7 @@ pub fn emit(frame: &Frame, unix_s: f64, out: &mut Vec<u8>) {
     };
     // Fails only where the writer does, which a vector never does.
     let written = rmp_serde::encode::write_named(out, &message);
-    debug_assert!(written.is_ok());
+    assert!(written.is_ok(), "{written:?}");
 }
 
 /// Reads a datagram.
