@@ -15,13 +15,13 @@ import { linkTo, linked } from "./linked.js";
 import { QUANTITIES } from "./quantities.js";
 import { mcapOf, recordOf } from "./recordings.js";
 import { Scales, ZOOM } from "./scale.js";
-import { frame, overEach, overFrequency, overTime } from "./scope_picture.js";
+import { frame, highestOf, overEach, overFrequency, overTime } from "./scope_picture.js";
 import { capturePanel } from "./scope_captures.js";
 import { computedPanel } from "./scope_computed.js";
 import { crossing, spectrum } from "./analysis.js";
 import { edge } from "./scope_edge.js";
 import { gestures, keyMeaning } from "./scope_pointer.js";
-import { measured } from "./scope_readout.js";
+import { measured, measuredSpectra } from "./scope_readout.js";
 import { scalePanel } from "./scope_scales.js";
 import { overlaid, panesOf, partnerOf } from "./scope_source.js";
 import { kept, keep } from "./settings.js";
@@ -109,7 +109,7 @@ export function scopeView(shared, report) {
     h("div", { class: "bar" }, trip.root, keeps),
     canvas,
     h("div", { class: "bar under" }, scale.root, unit),
-    h("div", { class: "bar" }, other, button("scope-clear", "Clear cursors", () => (cursors = [null, null])), button("scope-zoom-in", "Time +", () => zoom(null, 1 / ZOOM), "Shorter time (plus on the picture)"), button("scope-zoom-out", "Time −", () => zoom(null, ZOOM), "Longer time (minus on the picture)"), steps, frequencies, across, below),
+    h("div", { class: "bar" }, other, button("scope-clear", "Clear cursors", () => ([cursors, hertz] = [[null, null], [null, null]])), button("scope-zoom-in", "Time +", () => zoom(null, 1 / ZOOM), "Shorter time (plus on the picture)"), button("scope-zoom-out", "Time −", () => zoom(null, ZOOM), "Longer time (minus on the picture)"), steps, frequencies, across, below),
     readout,
     captures.root,
     fast.root,
@@ -118,11 +118,13 @@ export function scopeView(shared, report) {
     computed.root,
     h("div", { class: "bar" }, h("span", { class: "quiet" }, "Save as"), button("scope-save", "CSV", saveCsv, "A record, for ferrodrive plot and spreadsheets"), button("scope-mcap", "MCAP", saveMcap, "For Foxglove, PlotJuggler, Rerun and ferrodrive plot"), button("scope-svg", "SVG", saveSvg)),
     saved,
-    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. A tap sets cursor A, with Shift cursor B; key p: pause. While paused a drag moves, the wheel or two fingers zoom; on the figures beside a pane they zoom and move its scale, and a double tap sets it free."),
+    h("p", { class: "quiet" }, "Each point is one reading by SDO, about ten a second, fewer with many drives; for an added object, each frame that carries it. A tap sets cursor A, with Shift cursor B, in a spectrum too; key p: pause. While paused a drag moves, the wheel or two fingers zoom; on the figures beside a pane they zoom and move its scale, and a double tap sets it free."),
   );
   /** While paused: `{ columns, end_s, span_s, zero_s, marks, byTrigger, id, about }`; `id` is that of a capture that is shown by itself, `about`. */
   let frozen = null;
   let cursors = [null, null];
+  /** The cursors of the spectrum. */
+  let hertz = [null, null];
   let followed = linked.changes;
   let shown = false;
   /** What is on the canvas: its inputs, its extent, its areas, and what it drew. */
@@ -198,13 +200,18 @@ export function scopeView(shared, report) {
     return { sources, from_s, to_s: end_s, cursors, marks };
   }
 
-  /** The panes of it. */
+  /** A pane with the spectra of its lines, whose scale is its own. */
+  const spectraOf = (one, from_s, to_s) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, isCapture, series: of }) => ({ name, isCapture, spectrum: spectrum(of, from_s, to_s) })) });
+
+  /** The panes of it; with their spectra where these are looked at. */
   function drawn({ sources, from_s, to_s, marks }) {
     const all = panesOf(sources, { definitions: computed.definitions(), hidden, subtracts: captures.subtracts(), from_s });
     for (const one of all) if (trip.isOn() && trip.field() === one.key) one.level = trip.level();
     offered = all;
     const feed_m = (node) => feeds.get(node) ?? null;
-    return { panes: all.map((one) => inUnit(one, units[one.field], feed_m)), from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
+    const panes = all.map((one) => inUnit(one, units[one.field], feed_m));
+    const spectra = frequencies.checked ? { cursors: hertz, panes: panes.map((one) => spectraOf(one, from_s, to_s)) } : null;
+    return { panes, spectra, from_s, to_s, cursors, markers: marks.map(({ time_s, text }) => ({ time_s, text: cut(text) })) };
   }
 
   /** What is shown now, as a capture. */
@@ -238,10 +245,7 @@ export function scopeView(shared, report) {
   function paint(pen, width, height, now) {
     pen.font = "12px system-ui, sans-serif";
     const layout = { scales, together: together.checked, first: scale.pane() };
-    if (frequencies.checked) {
-      const all = now.panes.map((one) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, isCapture, series: of }) => ({ name, isCapture, spectrum: spectrum(of, now.from_s, now.to_s) })) }));
-      return overFrequency(pen, width, height, colours(), all, layout);
-    }
+    if (now.spectra) return overFrequency(pen, width, height, colours(), now.spectra, layout);
     if (!across.checked || !now.panes.length) return overTime(pen, width, height, colours(), now, layout);
     const under = now.panes.find(({ key }) => key === below.value) ?? now.panes[0];
     return overEach(pen, width, height, colours(), overBelow(now), under, layout);
@@ -252,7 +256,7 @@ export function scopeView(shared, report) {
     const lines = sources.map(({ name, columns }) => [name, columns.map(({ node, field, series: one }) => `${node} ${field} ${one.first_s()} ${one.last_s()} ${one.length}`)]);
     const set = [frequencies, steps, across, together].map((one) => one.checked);
     const trigger = [trip.isOn(), trip.field(), trip.level()];
-    return JSON.stringify([size, colours(), set, trigger, below.value, scale.pane(), scales.kept(), captures.subtracts(), [...hidden], units, [...feeds], computed.definitions(), from_s, to_s, cursors, marks.length, marks.at(-1)?.time_s, lines]);
+    return JSON.stringify([size, colours(), set, trigger, below.value, scale.pane(), scales.kept(), captures.subtracts(), [...hidden], units, [...feeds], computed.definitions(), from_s, to_s, cursors, hertz, marks.length, marks.at(-1)?.time_s, lines]);
   }
 
   function draw() {
@@ -279,9 +283,10 @@ export function scopeView(shared, report) {
     const least = `${(together.checked ? 1 : now.panes.length) * LOWEST_PANE}px`;
     if (canvas.style.minHeight !== least) canvas.style.minHeight = least;
     canvas.classList.toggle("held", frozen !== null);
-    extent = { ...frame(width), from_s: now.from_s, span_s: now.to_s - now.from_s };
+    const { spectra } = now;
+    extent = { ...frame(width), ...(spectra ? { from: 0, span: highestOf(spectra.panes) } : { from: now.from_s, span: now.to_s - now.from_s }) };
     offerPanes(now.panes);
-    setText(readout, measured(now, steps.checked));
+    setText(readout, spectra ? measuredSpectra(spectra) : measured(now, steps.checked));
   }
 
   function offerPanes(all) {
@@ -334,22 +339,28 @@ export function scopeView(shared, report) {
     if (linked.at_s < from_s || linked.at_s > frozen.end_s) frozen.end_s = linked.at_s + frozen.span_s / 2;
   }
 
-  function setCursor(which, at_s) {
-    cursors = which === 1 ? [cursors[0], at_s] : [at_s, cursors[1]];
+  /** At a time, or at a frequency in the picture of spectra. */
+  function setCursor(which, at) {
+    if (frequencies.checked) {
+      hertz = which === 1 ? [hertz[0], at] : [at, hertz[1]];
+      return;
+    }
+    cursors = which === 1 ? [cursors[0], at] : [at, cursors[1]];
     // The times of a file are not those of the bus.
-    if (which === 0 && !frozen?.id) linkTo(at_s);
+    if (which === 0 && !frozen?.id) linkTo(at);
     followed = linked.changes;
   }
 
   const isOverTime = () => extent !== null && !frequencies.checked && !across.checked;
-  const timeAt = (x) => extent.from_s + ((x - extent.left) / (extent.right - extent.left)) * extent.span_s;
+  /** The time or the frequency at a place of the picture. */
+  const placeAt = (x) => extent.from + ((x - extent.left) / (extent.right - extent.left)) * extent.span;
   const areaAt = (y) => areas.find(({ bottom }) => y <= bottom + 4) ?? areas.at(-1);
 
   /** Zooms in time around a place of the picture, its middle where there is none. The point under it stays there. */
   function zoom(x, times) {
     if (!isOverTime()) return;
     if (!frozen) freeze();
-    const around_s = x === null ? frozen.end_s - frozen.span_s / 2 : timeAt(x);
+    const around_s = x === null ? frozen.end_s - frozen.span_s / 2 : placeAt(x);
     const span_s = Math.min(LONGEST_S, Math.max(SHORTEST_S, frozen.span_s * times));
     frozen.end_s = around_s + ((frozen.end_s - around_s) * span_s) / frozen.span_s;
     frozen.span_s = span_s;
@@ -369,9 +380,9 @@ export function scopeView(shared, report) {
       tap(x, y, isOther) {
         const area = areaAt(y);
         if (area) scale.choose(area.key);
-        if (!isOverTime()) return;
-        const at_s = timeAt(x);
-        if (at_s >= extent.from_s && at_s <= extent.from_s + extent.span_s) setCursor(isOther !== other.checked ? 1 : 0, at_s);
+        if (extent === null || across.checked) return;
+        const at = placeAt(x);
+        if (at >= extent.from && at <= extent.from + extent.span) setCursor(isOther !== other.checked ? 1 : 0, at);
       },
       pan(dx) {
         if (frozen && isOverTime()) frozen.end_s -= (dx / (extent.right - extent.left)) * frozen.span_s;
@@ -408,9 +419,15 @@ export function scopeView(shared, report) {
 
   /** Keys on the picture; `by` is a number of steps. */
   const KEYS = {
-    cursor: (by) => isOverTime() && setCursor(other.checked ? 1 : 0, Math.min(extent.from_s + extent.span_s, Math.max(extent.from_s, (cursors[other.checked ? 1 : 0] ?? extent.from_s + extent.span_s / 2) + (by * extent.span_s) / 500))),
+    cursor(by) {
+      if (extent === null || across.checked) return;
+      const which = other.checked ? 1 : 0;
+      const { from, span } = extent;
+      const before = (frequencies.checked ? hertz : cursors)[which] ?? from + span / 2;
+      setCursor(which, Math.min(from + span, Math.max(from, before + (by * span) / 500)));
+    },
     other: () => (other.checked = !other.checked),
-    zoom: (by) => zoom(cursors[0] !== null && extent ? extent.left + ((cursors[0] - extent.from_s) / extent.span_s) * (extent.right - extent.left) : null, ZOOM ** by),
+    zoom: (by) => zoom(cursors[0] !== null && extent ? extent.left + ((cursors[0] - extent.from) / extent.span) * (extent.right - extent.left) : null, ZOOM ** by),
     pan: (by) => isOverTime() && frozen && (frozen.end_s += by * frozen.span_s * 0.5),
     scale: (by) => rescale(chosenArea(), (key, bounds) => scales.zoom(key, bounds, ZOOM ** by)),
     slide: (by) => rescale(chosenArea(), (key, bounds) => scales.move(key, bounds, by * 0.1)),
@@ -423,7 +440,7 @@ export function scopeView(shared, report) {
     if (!meaning) return;
     // A key may come before the picture that it means is drawn.
     const { from_s, to_s } = content();
-    extent = { ...frame(canvas.clientWidth), from_s, span_s: to_s - from_s };
+    if (!frequencies.checked) extent = { ...frame(canvas.clientWidth), from: from_s, span: to_s - from_s };
     KEYS[meaning.does](meaning.by);
     event.preventDefault();
     event.stopPropagation();

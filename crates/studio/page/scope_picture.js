@@ -216,6 +216,13 @@ function upright(pen, colour, at, height, text, pattern = []) {
   pen.fillText(text, at + 4, height - BELOW - 6);
 }
 
+/** The cursors that are in the picture. */
+function drawCursors(pen, colours, cursors, [from, to], x, height) {
+  cursors.forEach((at, which) => {
+    if (at !== null && at >= from && at <= to) upright(pen, colours.warn, x(at), height, "AB"[which]);
+  });
+}
+
 /** Values over time. Lines of the panes have `name` and `series`; `cursors` are times or null, `markers` have `time_s` and `text`. */
 export function overTime(pen, width, height, colours, { panes, from_s, to_s, cursors, markers }, layout) {
   const { left, right } = frame(width);
@@ -232,16 +239,17 @@ export function overTime(pen, width, height, colours, { panes, from_s, to_s, cur
   for (const { time_s, text } of markers) {
     if (time_s >= from_s && time_s <= to_s) upright(pen, colours.quiet, x(time_s), height, text, [2, 4]);
   }
-  cursors.forEach((at_s, which) => {
-    if (at_s !== null && at_s >= from_s && at_s <= to_s) upright(pen, colours.warn, x(at_s), height, "AB"[which]);
-  });
+  drawCursors(pen, colours, cursors, [from_s, to_s], x, height);
   return areas;
 }
 
-/** Amplitudes over frequency: lines of the panes have a `spectrum` or null. */
-export function overFrequency(pen, width, height, colours, panes, layout) {
+/** The highest frequency of the spectra of panes: the right edge of their picture. */
+export const highestOf = (panes) => Math.max(1, ...panes.flatMap(({ lines }) => lines.map(({ spectrum }) => spectrum?.hertz.at(-1) ?? 0)));
+
+/** Amplitudes over frequency: lines of the panes have a `spectrum` or null; `cursors` are frequencies or null. */
+export function overFrequency(pen, width, height, colours, { panes, cursors }, layout) {
   const { left, right } = frame(width);
-  const most = Math.max(1, ...panes.flatMap(({ lines }) => lines.map(({ spectrum }) => spectrum?.hertz.at(-1) ?? 0)));
+  const most = highestOf(panes);
   const x = (hertz) => left + (hertz / most) * (right - left);
   const drawn = panes.map((one) => {
     const lines = one.lines
@@ -253,6 +261,7 @@ export function overFrequency(pen, width, height, colours, panes, layout) {
   });
   const areas = each(pen, colours, drawn, width, height, x, { ...layout, together: false });
   axis(pen, colours, 0, most, x, height, "Hz");
+  drawCursors(pen, colours, cursors, [0, most], x, height);
   return areas;
 }
 

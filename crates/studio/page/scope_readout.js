@@ -12,9 +12,32 @@ function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, gr
 
 const tooFew = (few) => `too few readings: ${few} in the rise, expected at least 10. Map the object into a TPDO with an event timer of 1 ms (PDO view), start the node, and add the object here.`;
 
+/** Every line of the panes, with the label by which it is told from others. */
+const linesOf = (panes) => panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 || one.isCapture ? `${quantity.label} of ${one.name}` : quantity.label })));
+
+/** Amplitudes are small beside the values that they are of: so many decimals more. */
+const FINER = 2;
+
+/** The lines of the readout of spectra: at each cursor the amplitude of the spectral line nearest to it. */
+export function measuredSpectra({ panes, cursors }) {
+  const nearest = ({ hertz }, at) => hertz.reduce((best, one, place) => (Math.abs(one - at) < Math.abs(hertz[best] - at) ? place : best), 0);
+  const all = linesOf(panes).filter(({ spectrum }) => spectrum);
+  const lines = cursors.flatMap((at, which) => {
+    if (at === null) return [];
+    const values = all.map(({ label, unit, decimals, spectrum }) => {
+      const place = nearest(spectrum, at);
+      return `${label} ${number(spectrum.amplitude[place], decimals + FINER)} ${unit} (line at ${number(spectrum.hertz[place], 2)} Hz)`;
+    });
+    return [`${"AB"[which]} at ${number(at, 2)} Hz: ${values.join(", ") || "no spectrum there"}`];
+  });
+  const [a, b] = cursors;
+  if (a !== null && b !== null) lines.push(`B − A: ${number(b - a, 2)} Hz`);
+  return lines.join("\n");
+}
+
 /** The lines of the readout of a picture; `steps`: with the step response of each line. */
 export function measured({ panes, from_s, to_s, cursors }, steps) {
-  const all = panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 || one.isCapture ? `${quantity.label} of ${one.name}` : quantity.label })));
+  const all = linesOf(panes);
   const lines = [];
   const [a, b] = cursors.map((at_s) => (at_s === null ? null : all.map((one) => (at_s > one.series.last_s() ? null : one.series.value(at_s)))));
   const listed = (values) => all.map(({ label, unit, decimals }, at) => `${label} ${number(values[at], decimals)} ${unit}`).join(", ");

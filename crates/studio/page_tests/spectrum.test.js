@@ -5,6 +5,7 @@ import { test } from "node:test";
 
 import { crossing, spectrum } from "../page/analysis.js";
 import { edge } from "../page/scope_edge.js";
+import { measuredSpectra } from "../page/scope_readout.js";
 import { Series } from "../page/series.js";
 
 const of = (value, count) => {
@@ -22,6 +23,17 @@ test("the spectrum of two sines on a slope is two lines", () => {
   const others = amplitude.filter((_, at) => Math.abs(hertz[at] - 31.25) > 1 && Math.abs(hertz[at] - 125) > 1);
   assert.ok(Math.max(...others) < 5e-3);
   assert.equal(spectrum(of((t) => t, 15), 0, 1), null, "too few");
+});
+
+test("a cursor in a spectrum reads the amplitude of the line nearest to it, of each value", () => {
+  const sine = (amplitude, hertz) => spectrum(of((t) => amplitude * Math.sin(2 * Math.PI * hertz * t), 4096), 0, 5);
+  const pane = (label, unit, ...spectra) => ({ label, unit, decimals: 1, lines: spectra.map((one, at) => ({ name: `node ${at}`, spectrum: one })) });
+  const panes = [pane("Speed", "r/min", sine(0.7, 31.25)), pane("Current", "A", sine(0.2, 125), sine(0.4, 31.25)), pane("Supply", "V", null)];
+  const lines = measuredSpectra({ panes, cursors: [31.3, 125.1] }).split("\n");
+  assert.equal(lines[0], "A at 31.30 Hz: Speed 0.700 r/min (line at 31.25 Hz), Current of node 0 0.000 A (line at 31.25 Hz), Current of node 1 0.400 A (line at 31.25 Hz)");
+  assert.match(lines[1], /^B at 125\.10 Hz: .*Current of node 0 0\.200 A \(line at 125\.00 Hz\)/);
+  assert.equal(lines[2], "B \u2212 A: 93.80 Hz");
+  assert.equal(measuredSpectra({ panes, cursors: [null, null] }), "");
 });
 
 test("a lag of first order crosses a level at its logarithm, and never the other way", () => {
