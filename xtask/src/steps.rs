@@ -28,7 +28,8 @@ pub(crate) enum When {
     Building,
     /// Then steps that keep the processor busy, one after the other,
     Busy,
-    /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the longest first.
+    /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the
+    /// longest first, but for one.
     Waiting,
     /// Only where it is named: it would make the usual list longer by minutes, and is about few files.
     Named,
@@ -95,12 +96,6 @@ pub(crate) const STEPS: &[TestStep] = &[
         run: examples::run,
     },
     TestStep {
-        name: "peers",
-        does: "canopen-python, python-can and pymodbus against ferrodrive sim",
-        when: When::Busy,
-        run: peers::run,
-    },
-    TestStep {
         name: "page",
         does: "what the studio's page computes and says, by node",
         when: When::Busy,
@@ -129,6 +124,13 @@ pub(crate) const STEPS: &[TestStep] = &[
         does: "JSON of every command, and control connections, by their schemas",
         when: When::Waiting,
         run: schema,
+    },
+    TestStep {
+        name: "peers",
+        does: "canopen-python, python-can and pymodbus against ferrodrive sim",
+        // Last: by then the wheel that it installs is being built.
+        when: When::Waiting,
+        run: peers::run,
     },
     TestStep {
         name: "web",

@@ -17,6 +17,7 @@ mod channels;
 mod column;
 mod convert;
 mod csv;
+mod difference;
 mod mcap_file;
 mod mcap_read;
 mod mcap_writer;

@@ -12,7 +12,7 @@ function shownStep({ from, to, rise_s, overshoot, overshoot_grid, settling_s, gr
 
 const tooFew = (few) => `too few readings: ${few} in the rise, expected at least 10. Map the object into a TPDO with an event timer of 1 ms (PDO view), start the node, and add the object here.`;
 
-/** Every line of the panes, with the label by which it is told from others. */
+/** Every line of the panes, with a label of its own. */
 const linesOf = (panes) => panes.flatMap(({ lines, ...quantity }) => lines.map((one) => ({ ...quantity, ...one, label: lines.length > 1 || one.isCapture ? `${quantity.label} of ${one.name}` : quantity.label })));
 
 /** Amplitudes are small beside the values that they are of: so many decimals more. */

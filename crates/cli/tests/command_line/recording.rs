@@ -43,6 +43,7 @@ fn a_picture_overwrites_only_a_picture() {
     refused(&["plot", csv, "--signals", "velocty_rpm"], &["did you mean velocity_rpm"]);
     refused(&["plot", csv, "--from", "5"], &["recorded from 0.000 s to 1.000 s"]);
     refused(&["plot", csv, "--from", "1", "--to", "0.5"], &["--to is before --from"]);
+    refused(&["plot", csv, "--subtract"], &["two records or more", "--subtract"]);
     refused(&["plot", letter.to_str().unwrap()], &["NAME.mcap or NAME.csv"]);
     refused(&["plot", "/nowhere/run.mcap"], &["cannot read the record"]);
     let wrong = place.join("wrong.mcap");
@@ -315,6 +316,13 @@ fn captures_are_taken_as_often_as_was_asked_for_each_into_a_file_of_its_own() {
     let picture = drawn["picture"].as_str().unwrap();
     assert!(picture.contains("actual, run.csv") && picture.contains("actual, run-2.csv"), "{drawn}");
     assert_eq!((&drawn["records"][1], &drawn["signals"]), (&second.as_str().into(), &2.into()));
+    let drawn = done(&["plot", &second, &first, "--subtract", "-o", "-", "--json"]).json();
+    let picture = drawn["picture"].as_str().unwrap();
+    assert!(picture.contains("run-2.csv less run.csv") && drawn["signals"] == 1, "{drawn}");
+    let other = place.path("other.csv");
+    std::fs::write(&other, "t_s,7.velocity_rpm\n0,0\n0.05,1\n").unwrap();
+    let refused = ferrodrive(&["plot", &first, &other, "--subtract", "-o", "-"]);
+    assert!(refused.status == Some(1) && refused.err.contains("no signal in common"), "{}", refused.err);
     let refused = ferrodrive(&["plot", &first, &second, "--align", "trigger", "-o", "-"]);
     assert!(refused.status == Some(1) && refused.err.contains("run.csv has no trigger"), "{}", refused.err);
 }

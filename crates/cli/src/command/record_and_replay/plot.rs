@@ -28,7 +28,8 @@ use plot::Paint;
     ferrodrive plot run.mcap -o run.svg\n  \
     ferrodrive plot trace.blf --machine base.toml\n  \
     ferrodrive plot run.csv --signals velocity --from 1.5s --to 3s -o run.html\n  \
-    ferrodrive plot before.mcap after.mcap --align trigger -o both.html")]
+    ferrodrive plot before.mcap after.mcap --align trigger -o both.html\n  \
+    ferrodrive plot after.mcap before.mcap --subtract -o change.svg")]
 pub(crate) struct Plot {
     /// Record, NAME.mcap or NAME.csv; or a log of frames (candump, BLF, ..), whose PDOs are decoded by --model or --machine
     ///
@@ -38,6 +39,9 @@ pub(crate) struct Plot {
     /// What several have in common at 0 s
     #[arg(long, value_enum, default_value = "begin")]
     align: Align,
+    /// Draw the first less each of the others, instead of all
+    #[arg(long)]
+    subtract: bool,
     /// Signals, e.g. velocity,4.current_a,5.* (default: positions, velocities, currents and supplies)
     #[arg(long, value_name = "SIGNAL,..", value_delimiter = ',')]
     signals: Vec<String>,
@@ -118,6 +122,9 @@ impl Plot {
                 if self.align == Align::Trigger { triggered(path, recorded)? } else { recorded },
             ));
         }
+        if self.subtract {
+            records = differences(&records)?;
+        }
         let named: Vec<_> = match records.as_slice() {
             [(_, only)] => vec![("", only)],
             all => all.iter().map(|(name, recorded)| (name.as_str(), recorded)).collect(),
@@ -153,6 +160,30 @@ impl Plot {
 
 fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The first of some records less each of the others, with what it is called.
+fn differences(records: &[(String, Recorded)]) -> Result<Vec<(String, Recorded)>, Failure> {
+    let ((name, first), others) = match records {
+        [first, others @ ..] if !others.is_empty() => (first, others),
+        _ => {
+            return Err(Failure::usage("--subtract needs two records or more").next(
+                "name those that the first is to be less, e.g. ferrodrive plot after.mcap before.mcap --subtract",
+            ));
+        }
+    };
+    let less = others.iter().map(|(other, recorded)| {
+        let less = first.less(recorded);
+        if less.series.iter().any(|series| !series.points.is_empty()) {
+            return Ok((format!("{name} less {other}"), less));
+        }
+        let because =
+            if less.series.is_empty() { "they have no signal in common" } else { "they have no time in common" };
+        Err(Failure::bad_file(format!("cannot subtract {other} from {name}"))
+            .because(because)
+            .next("compare records of the same drive, aligned by --align begin or trigger"))
+    });
+    less.collect()
 }
 
 /// A capture with its trigger at 0 s.
