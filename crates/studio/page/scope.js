@@ -42,6 +42,9 @@ const LOWEST_PANE = 76;
 const SETTINGS = "scope";
 const HIDDEN = ["supply_v", "position_counts", "statusword"];
 
+/** What the key of a pane with spectra begins with. */
+const SPECTRAL = /^Hz /;
+
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
 export function scopeView(shared, report) {
@@ -291,7 +294,7 @@ export function scopeView(shared, report) {
 
   function offerPanes(all) {
     const before = scale.pane();
-    scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key)?.label ?? key })));
+    scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key.replace(SPECTRAL, ""))?.label ?? key })));
     // In another unit a pane has another key, and stays the chosen one.
     const same = all.find(({ field }) => field === paneField);
     if (scale.pane() !== before && same && areas.some(({ key }) => key === same.key)) scale.choose(same.key);

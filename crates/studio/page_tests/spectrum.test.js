@@ -34,6 +34,8 @@ test("a cursor in a spectrum reads the amplitude of the line nearest to it, of e
   assert.match(lines[1], /^B at 125\.10 Hz: .*Current of node 0 0\.200 A \(line at 125\.00 Hz\)/);
   assert.equal(lines[2], "B \u2212 A: 93.80 Hz");
   assert.equal(measuredSpectra({ panes, cursors: [null, null] }), "");
+  // 1000 samples a second have lines up to 500 Hz.
+  assert.match(measuredSpectra({ panes, cursors: [600, null] }), /^A at 600\.00 Hz: Speed not sampled so often, Current of node 0 not sampled/);
 });
 
 test("a lag of first order crosses a level at its logarithm, and never the other way", () => {
