@@ -208,11 +208,14 @@ def served(bench):
         with in_a_terminal(words) as (stderr, terminal), viewing(connect, place(stderr)) as viewer:
             # Its time begins when a host is on its bus.
             ready = eventually(lambda: re.findall(r"ready socketcand://127.0.0.1:(\d+)", terminal()), bool, "the bus")
-            with can.Bus(interface="socketcand", host="127.0.0.1", port=int(ready[0]), channel="can0"):
+            # Again and again: the viewer may not be there yet when the first ones pass.
+            asks = can.Message(arbitration_id=0x604, data=[0x40, 0, 0x10, 0, 0, 0, 0, 0], is_extended_id=False)
+            with can.Bus(interface="socketcand", host="127.0.0.1", port=int(ready[0]), channel="can0") as host:
+                host.send_periodic(asks, 0.1)
                 seen = until_each(viewer, ("/node/4", "/can"))
     values, frame = (decoder(channel)(data) for channel, data in (seen["/node/4"], seen["/can"]))
     near(values.supply_v, 48, 1, "supply")
-    equal(frame.id, 0x704, "identifier of a boot-up or a heartbeat")
+    true(frame.id & 0x7F == 4, f"a frame of node 4: {frame.id:03X}h")
 
 
 @check("the client of Foxglove Studio and Lichtblick reads a drive that turns", ZLAC8030L)
