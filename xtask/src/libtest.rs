@@ -72,7 +72,7 @@ impl Reader {
             Ok(true) => {}
             Ok(false) if self.tally.failed > 0 => {
                 self.tally.note = self.failed.join(", ");
-                self.tally.said = said_by_failed_tests(&self.shown);
+                self.tally.output = output_of_failed_tests(&self.shown);
             }
             Ok(false) => self.tally.add(&Tally::failed(format!("{name} ended badly: read the lines above"))),
             Err(error) => self.tally.add(&Tally::failed(error)),
@@ -107,7 +107,7 @@ pub(crate) fn failed_test(line: &str) -> Option<String> {
 
 /// Of the lines of a program, those between the heading of the first failed test and the list of their names; without the
 /// frames of backtraces.
-fn said_by_failed_tests(lines: &[String]) -> Vec<String> {
+fn output_of_failed_tests(lines: &[String]) -> Vec<String> {
     let heading = |line: &&String| line.starts_with("---- ");
     let from_first = lines.iter().skip_while(|line| !heading(line)).take_while(|line| *line != "failures:");
     let is_frame = |line: &str| {
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_failed_tests_said_is_kept_without_their_backtraces() {
+    fn what_failed_tests_printed_is_kept_without_their_backtraces() {
         let printed = [
             "test a ... FAILED",
             "failures:",
@@ -167,7 +167,7 @@ mod tests {
         let (tally, _) = read.end("a", Ok(false));
         assert_eq!((tally.failed, tally.note.as_str()), (1, "a"));
         assert_eq!(
-            tally.said,
+            tally.output,
             ["---- a stdout ----", "thread 'a' panicked at src/a.rs:3:5:", "1: not 2", "stack backtrace:"]
         );
     }

@@ -28,8 +28,8 @@ pub(crate) enum When {
     Building,
     /// Then steps that keep the processor busy, one after the other,
     Busy,
-    /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; the
-    /// longest first, but for one.
+    /// and, beside them, two at a time, steps that mostly wait for time to pass, for a browser, for a virtual machine; in
+    /// the order of the table.
     Waiting,
     /// Only where it is named: it would make the usual list longer by minutes, and is about few files.
     Named,

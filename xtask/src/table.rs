@@ -9,12 +9,12 @@ use crate::tally::Tally;
 pub(crate) type StepRow = (&'static str, Duration, Tally);
 
 /// How many lines of what the failed tests of a step printed are shown again.
-const SAID_AGAIN: usize = 60;
+const SHOWN_AGAIN: usize = 60;
 
-/// Prints what failed tests said, and the table; success if nothing failed.
+/// Shows what failed tests printed, and the table; success if nothing failed.
 pub(crate) fn conclude(rows: &[StepRow], took: Duration) -> ExitCode {
     for (name, _, tally) in rows {
-        tally.said.iter().take(SAID_AGAIN).for_each(|line| println!("{name:10} | {line}"));
+        tally.output.iter().take(SHOWN_AGAIN).for_each(|line| println!("{name:10} | {line}"));
     }
     println!("\n{:10} {:8} {:>8} {:>7} {:>7} {:>8}  note", "step", "result", "time", "passed", "failed", "skipped");
     for (name, took, tally) in rows {

@@ -9,7 +9,7 @@ pub(crate) struct Tally {
     /// One line for the table: what failed, or why something was skipped.
     pub(crate) note: String,
     /// What failed tests printed: shown again at the end of a run, which is all that some see of it.
-    pub(crate) said: Vec<String>,
+    pub(crate) output: Vec<String>,
 }
 
 impl Tally {
@@ -33,7 +33,7 @@ impl Tally {
         self.passed += other.passed;
         self.failed += other.failed;
         self.skipped += other.skipped;
-        self.said.extend_from_slice(&other.said);
+        self.output.extend_from_slice(&other.output);
         if !other.note.is_empty() {
             if !self.note.is_empty() {
                 self.note.push_str("; ");
