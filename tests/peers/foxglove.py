@@ -18,6 +18,7 @@ import subprocess
 import tempfile
 import termios
 import threading
+import time
 
 import can
 
@@ -72,15 +73,18 @@ def sample(message):
     return *struct.unpack_from("<IQ", message, 1), message[13:]
 
 
-def until_each(viewer, wanted):
-    """Subscribes to what is advertised, when it is, until a message of each of the topics has come: the channel and its last data."""
+def until_each(viewer, wanted, counts=lambda channel, data: True):
+    """Subscribes to what is advertised, when it is, until a message of each of the topics has come that counts: the channel and its data."""
     channels, seen = {}, {}
+    end = time.monotonic() + PATIENCE_S
     while not set(wanted) <= set(seen):
+        true(time.monotonic() < end, f"a message of each of {wanted}, and not of {sorted(seen)} alone")
         message = viewer.recv(PATIENCE_S)
         if isinstance(message, bytes):
             if message[0] == MESSAGE_DATA:
                 number, _, data = sample(message)
-                seen[channels[number]["topic"]] = (channels[number], data)
+                if counts(channels[number], data):
+                    seen[channels[number]["topic"]] = (channels[number], data)
         elif (said := json.loads(message))["op"] == "advertise":
             new = {channel["id"]: channel for channel in said["channels"]}
             channels |= new
@@ -208,14 +212,15 @@ def served(bench):
         with in_a_terminal(words) as (stderr, terminal), viewing(connect, place(stderr)) as viewer:
             # Its time begins when a host is on its bus.
             ready = eventually(lambda: re.findall(r"ready socketcand://127.0.0.1:(\d+)", terminal()), bool, "the bus")
-            # Again and again: the viewer may not be there yet when the first ones pass.
+            # Again and again: the viewer may have subscribed to nothing yet when the first ones pass.
             asks = can.Message(arbitration_id=0x604, data=[0x40, 0, 0x10, 0, 0, 0, 0, 0], is_extended_id=False)
             with can.Bus(interface="socketcand", host="127.0.0.1", port=int(ready[0]), channel="can0") as host:
                 host.send_periodic(asks, 0.1)
-                seen = until_each(viewer, ("/node/4", "/can"))
+                seen = until_each(viewer, ("/node/4", "/can"), lambda channel, data: channel["topic"] != "/can" or decoder(channel)(data).id == 0x584)
     values, frame = (decoder(channel)(data) for channel, data in (seen["/node/4"], seen["/can"]))
     near(values.supply_v, 48, 1, "supply")
-    true(frame.id & 0x7F == 4, f"a frame of node 4: {frame.id:03X}h")
+    # The device type, by its number of the profile (CiA 402-1).
+    equal(bytes(frame.data[:6]), bytes([0x43, 0, 0x10, 0, 0x92, 0x01]), "answer to the upload of 1000h")
 
 
 @check("the client of Foxglove Studio and Lichtblick reads a drive that turns", ZLAC8030L)

@@ -323,6 +323,9 @@ fn captures_are_taken_as_often_as_was_asked_for_each_into_a_file_of_its_own() {
     std::fs::write(&other, "t_s,7.velocity_rpm\n0,0\n0.05,1\n").unwrap();
     let refused = ferrodrive(&["plot", &first, &other, "--subtract", "-o", "-"]);
     assert!(refused.status == Some(1) && refused.err.contains("no signal in common"), "{}", refused.err);
+    std::fs::write(&other, std::fs::read_to_string(&first).unwrap().replace("\n0", "\n9")).unwrap();
+    let refused = ferrodrive(&["plot", &first, &other, "--subtract", "-o", "-"]);
+    assert!(refused.status == Some(1) && refused.err.contains("no time in common"), "{}", refused.err);
     let refused = ferrodrive(&["plot", &first, &second, "--align", "trigger", "-o", "-"]);
     assert!(refused.status == Some(1) && refused.err.contains("run.csv has no trigger"), "{}", refused.err);
 }

@@ -309,6 +309,17 @@ fn a_scan_finds_who_answers_and_who_only_beats() {
     assert!(bus.now - Instant::from_secs(5) < Duration::from_millis(1_300), "{}", bus.now);
 }
 
+/// Nodes that are not there are waited for side by side: three times half a second behind the first, and for 3 s.
+#[test]
+fn a_scan_with_a_long_timeout_takes_that_long_once() {
+    let mut bus = Bus::new(vec![zlac8030l(4), zlac8030l(127)]);
+    let (network, began) = (bus.network.clone(), bus.now);
+    let found = bus.block_on(network.scan(Duration::from_secs(3), |_| {}));
+    assert_eq!(found.iter().map(|node| node.node.raw()).collect::<Vec<_>>(), [4, 127]);
+    let took = bus.now - began;
+    assert!((Duration::from_millis(4_400)..Duration::from_millis(4_700)).contains(&took), "{took:?}");
+}
+
 /// Web handlers and multi-threaded runtimes need it.
 #[test]
 fn futures_can_be_sent_between_threads() {

@@ -13,7 +13,7 @@ async fn a_fault_is_shown_with_its_remedy_and_the_frames_around() {
     let drives = ["zlac8030l@4", "m4230e17b50@1", "zlim42c@2"].map(|drive| ["--drive", drive]).concat();
     let mut simulator = Simulator::start(&[&drives[..], &["--serve", "socketcand://127.0.0.1:0"]].concat());
     let bus = simulator.bus("socketcand");
-    // A scan waits four times as long for what is not there.
+    // A scan waits as long for nodes that are not there.
     let patient = ["--timeout", "5s", "--bus", &bus, "--model", "4=zlac8030l", "--model", "2=zlim42c"];
     let stage = Stage::open_on("faults", &patient).await;
     let ok = simulator.ask("4 supply 80");

@@ -2,7 +2,7 @@
 //!
 //! A few seconds in the tests. With `FERRODRIVE_FIGURES_S=600` ten minutes, and what it says is for `docs/performance.md`:
 //!
-//! `FERRODRIVE_FIGURES_S=600 cargo test --release -p ferrodrive --test studio_browser figures -- --ignored --nocapture`
+//! `FERRODRIVE_FIGURES_S=600 cargo test -p ferrodrive-browser-and-schema figures -- --ignored --nocapture`
 
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
