@@ -18,7 +18,7 @@ addEventListener("pointerdown", (event) => open && !open.root.contains(event.tar
  * disabled, title }`; the value stays if it is still among them, else it is the first one's. `onopen` is called, and what it
  * promises awaited, before its list is shown: no line moves away from under the pointer.
  */
-export function choice(id, label, options = [], { value = undefined, onopen = async () => {}, onchange = () => {} } = {}) {
+export function choice(id, label, options = [], { value = undefined, onopen = () => {}, onchange = () => {} } = {}) {
   const shown = h("span", { class: "choice-text" });
   const button = h("button", { type: "button", role: "combobox", "aria-haspopup": "listbox", "aria-expanded": "false", "aria-label": label, onclick: () => (mine === open ? close() : show()) }, shown);
   const list = h("ul", { role: "listbox", "aria-label": label, hidden: true });
@@ -44,7 +44,6 @@ export function choice(id, label, options = [], { value = undefined, onopen = as
   }
 
   async function show() {
-    closeChoice();
     await onopen();
     closeChoice();
     open = mine;

@@ -43,7 +43,7 @@ const SETTINGS = "scope";
 const HIDDEN = ["supply_v", "position_counts", "statusword"];
 
 /** What the key of a pane with spectra begins with. */
-const SPECTRAL = /^Hz /;
+const SPECTRAL = "Hz ";
 
 const cut = (text) => (text.length > LONGEST_MARK ? `${text.slice(0, LONGEST_MARK - 1)}…` : text);
 
@@ -204,7 +204,7 @@ export function scopeView(shared, report) {
   }
 
   /** A pane with the spectra of its lines, whose scale is its own. */
-  const spectraOf = (one, from_s, to_s) => ({ ...one, key: `Hz ${one.key}`, lines: one.lines.map(({ name, isCapture, series: of }) => ({ name, isCapture, spectrum: spectrum(of, from_s, to_s) })) });
+  const spectraOf = (one, from_s, to_s) => ({ ...one, key: SPECTRAL + one.key, lines: one.lines.map(({ name, isCapture, series: of }) => ({ name, isCapture, spectrum: spectrum(of, from_s, to_s) })) });
 
   /** The panes of it; with their spectra where these are looked at. */
   function drawn({ sources, from_s, to_s, marks }) {
@@ -294,7 +294,7 @@ export function scopeView(shared, report) {
 
   function offerPanes(all) {
     const before = scale.pane();
-    scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => one.key === key.replace(SPECTRAL, ""))?.label ?? key })));
+    scale.offer(areas.map(({ key }) => ({ key, label: all.find((one) => key === one.key || key === SPECTRAL + one.key)?.label ?? key })));
     // In another unit a pane has another key, and stays the chosen one.
     const same = all.find(({ field }) => field === paneField);
     if (scale.pane() !== before && same && areas.some(({ key }) => key === same.key)) scale.choose(same.key);

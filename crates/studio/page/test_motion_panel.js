@@ -66,7 +66,7 @@ export function testMotionPanel(shared, report, { taken, open }) {
     setText(about, text);
   }
 
-  async function offerPaths() {
+  function offerPaths() {
     path.offer(captures.filter((one) => pathOf(one)).map(({ id, name }) => ({ value: id, text: name })));
   }
 
