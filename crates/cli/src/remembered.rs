@@ -128,19 +128,14 @@ fn path() -> Option<PathBuf> {
 mod tests {
     use super::*;
 
-    fn fresh(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("ferrodrive-remembered-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
-        folder.join("cache/remembered.json")
-    }
-
     fn node(raw: u8) -> NodeId {
         NodeId::new(raw).expect("1 to 127")
     }
 
     #[test]
     fn what_was_said_and_heard_is_there_in_the_next_call_and_no_more_than_fits() {
-        let path = fresh("said");
+        let scratch = processes::scratch("remembered");
+        let path = scratch.join("cache/remembered.json");
         let mut first = Remembered::of(Some(path.clone()));
         assert!(first.is_new("a guess") && !first.is_new("a guess"));
         first.heard("can0", [(node(4), Some("zlac8030l")), (node(2), None)].into_iter());
@@ -164,8 +159,8 @@ mod tests {
 
     #[test]
     fn a_file_that_is_none_of_ours_is_an_empty_one_and_a_folder_that_takes_none_is_no_matter() {
-        let path = fresh("foreign");
-        fs::create_dir_all(path.parent().expect("a folder")).expect("it can be made");
+        let scratch = processes::scratch("remembered-foreign");
+        let path = scratch.join("remembered.json");
         for text in ["", "[1, 2]", "{\"buses\": 5}", "\u{0}\u{1}"] {
             fs::write(&path, text).expect("it can be written");
             assert_eq!(Remembered::of(Some(path.clone())).buses().count(), 0, "{text:?}");

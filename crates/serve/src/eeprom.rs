@@ -206,7 +206,6 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scratch;
 
     #[test]
     fn crc_matches_the_published_check_value() {
@@ -215,13 +214,13 @@ mod tests {
 
     #[test]
     fn what_was_stored_is_loaded() {
-        let path = scratch("stored");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let eeproms = Eeproms::open(&path).unwrap();
         assert_eq!(eeproms.load("zlac8030l@4", "zlac8030l").unwrap(), None);
         eeproms.store("zlac8030l@4", "zlac8030l", b"one").unwrap();
         eeproms.store("zlac8030l@4", "zlac8030l", b"two").unwrap();
         assert_eq!(eeproms.load("zlac8030l@4", "zlac8030l").unwrap().unwrap(), b"two");
-        fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
@@ -240,7 +239,8 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn two_simulators_cannot_share_a_directory_whatever_is_removed_from_it() {
-        let path = scratch("shared");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let first = Eeproms::open(&path).unwrap();
         first.store("a@1", "a", b"one").unwrap();
         assert!(matches!(Eeproms::open(&path), Err(EepromError::InUse(_))));
@@ -253,14 +253,14 @@ mod tests {
         let second = Eeproms::open(&path).unwrap();
         assert!(matches!(first.store("a@1", "a", b"two"), Err(EepromError::Replaced(_))));
         assert_eq!(second.load("a@1", "a").unwrap(), None);
-        fs::remove_dir_all(path).unwrap();
     }
 
     #[cfg(unix)]
     #[test]
     fn links_and_files_of_others_are_left_alone() {
         use std::os::unix::fs::symlink;
-        let path = scratch("foreign");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let (state, link) = (path.join("state"), path.join("link"));
         fs::create_dir(&state).unwrap();
         symlink(&state, &link).unwrap();
@@ -278,41 +278,40 @@ mod tests {
         assert!(matches!(eeproms.store("c@1", "c", b"new"), Err(EepromError::File(..))));
         assert_eq!(fs::read(state.join("c@1.new")).unwrap(), b"precious");
         assert_eq!(fs::read(&victim).unwrap(), b"precious");
-        fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
     fn what_a_kill_has_left_of_a_new_file_is_in_nobodys_way() {
-        let path = scratch("torn");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let eeproms = Eeproms::open(&path).unwrap();
         let whole = wrap(b"image", "a");
         for length in [0, 5, MAGIC.len(), whole.len() - 1, whole.len()] {
             fs::write(path.join("a@1.new"), &whole[..length]).unwrap();
             eeproms.store("a@1", "a", b"new").unwrap();
         }
-        fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
     fn a_file_that_is_far_too_long_is_not_read() {
-        let path = scratch("long");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let eeproms = Eeproms::open(&path).unwrap();
         // 3 GB that take no room.
         File::create(path.join("a@1.eeprom")).and_then(|file| file.set_len(3 << 30)).unwrap();
         let refused = eeproms.load("a@1", "a").unwrap_err().to_string();
         assert!(refused.contains("a@1.eeprom") && refused.contains("longer than 65536 bytes"), "{refused}");
-        fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
     fn a_directory_that_cannot_be_written_keeps_the_old_image() {
-        let path = scratch("full");
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path();
         let eeproms = Eeproms::open(&path).unwrap();
         eeproms.store("a@1", "a", b"old").unwrap();
         // A directory in the place of the new file makes writing fail as a full disk does.
         fs::create_dir(path.join("a@1.new")).unwrap();
         assert!(matches!(eeproms.store("a@1", "a", b"new"), Err(EepromError::File(..))));
         assert_eq!(eeproms.load("a@1", "a").unwrap().unwrap(), b"old");
-        fs::remove_dir_all(path).unwrap();
     }
 }

@@ -143,11 +143,11 @@ pub fn identity(_: &Metadata) -> Option<(u64, u64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scratch;
 
     #[test]
     fn a_log_replaces_a_log_and_nothing_else() {
-        let place = scratch("logs");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let (log, letter) = (place.join("log"), place.join("letter"));
         drop(create_log(&log, Format::Candump).unwrap());
         fs::write(&log, "(1.0) can0 701#05\n").unwrap();
@@ -159,12 +159,12 @@ mod tests {
         );
         assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
         assert!(create_log(&place, Format::Candump).unwrap_err().to_string().contains("directory"));
-        fs::remove_dir_all(place).unwrap();
     }
 
     #[test]
     fn a_record_replaces_a_record_of_its_kind_and_nothing_else() {
-        let place = scratch("records");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let (mcap, csv) = (place.join("a.mcap"), place.join("a.csv"));
         fs::write(&mcap, b"\x89MCAP0\r\nand more").unwrap();
         fs::write(&csv, "t_s,4.velocity_rpm,mark\n").unwrap();
@@ -186,13 +186,13 @@ mod tests {
         assert!(!free.exists());
         assert!(check_record(&csv.join("in_a_file.csv"), Kind::Csv).is_err());
         assert_eq!(check_record(&place.join("no/a.csv"), Kind::Csv).unwrap_err().kind(), io::ErrorKind::NotFound);
-        fs::remove_dir_all(place).unwrap();
     }
 
     #[cfg(unix)]
     #[test]
     fn a_symbolic_link_is_neither_read_nor_written() {
-        let place = scratch("links");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let (target, link) = (place.join("target"), place.join("link"));
         fs::write(&target, "(mine").unwrap();
         std::os::unix::fs::symlink(&target, &link).unwrap();
@@ -202,17 +202,16 @@ mod tests {
         // One that leads nowhere is not a free name either.
         fs::remove_file(&target).unwrap();
         assert!(create_log(&link, Format::Candump).is_err() && create_new(&link).is_err() && !target.exists());
-        fs::remove_dir_all(place).unwrap();
     }
 
     #[test]
     fn what_is_longer_than_its_bound_is_refused() {
-        let place = scratch("bound");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let path = place.join("file");
         assert_eq!(read_bounded(&path, 4).unwrap(), None);
         fs::write(&path, "four").unwrap();
         assert_eq!(read_bounded(&path, 4).unwrap().unwrap(), b"four");
         assert!(read_bounded(&path, 3).unwrap_err().to_string().contains("longer than 3 bytes"));
-        fs::remove_dir_all(place).unwrap();
     }
 }

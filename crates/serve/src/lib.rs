@@ -42,12 +42,3 @@ mod stores;
 pub mod world;
 mod world_bus;
 pub mod writing;
-
-/// An empty directory of a test's own.
-#[cfg(test)]
-pub(crate) fn scratch(name: &str) -> std::path::PathBuf {
-    let path = std::env::temp_dir().join(format!("ferrodrive-serve-{}-{name}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&path);
-    std::fs::create_dir_all(&path).expect("the temporary directory can be written");
-    path
-}

@@ -299,14 +299,14 @@ mod tests {
     use super::*;
     use crate::files::{create_log, create_record};
     use crate::pacer::{Clock, Pacer, Speed};
-    use crate::scratch;
     use crate::writing::{Pace, RecordFile};
 
     type Asked = Request<Failure>;
 
     /// The record and the log of some lines; before line `keep_before` the clock comes to where they are looked for.
     fn written(kind: Kind, keep_before: usize) -> [Vec<u8>; 2] {
-        let folder = scratch(&format!("by-hand-{kind:?}-{keep_before}"));
+        let scratch = tempfile::tempdir().unwrap();
+        let folder = scratch.path();
         std::fs::create_dir_all(&folder).unwrap();
         let (path, log) = (folder.join("record"), folder.join("log"));
         let mut world = World::new(Bitrate::K500, 1);
@@ -352,7 +352,6 @@ mod tests {
         }
         assert!(service.part(&mut served).torn.is_empty());
         let bytes = [path, log].map(|path| std::fs::read(path).unwrap());
-        std::fs::remove_dir_all(folder).unwrap();
         bytes
     }
 

@@ -142,7 +142,6 @@ impl WriterQueue {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scratch;
 
     const SOON: Duration = Duration::from_secs(600);
 
@@ -152,7 +151,8 @@ mod tests {
 
     #[test]
     fn what_is_settled_is_on_the_disk() {
-        let place = scratch("settled");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let eeproms = Eeproms::open(&place).unwrap();
         let (wake, woken) = channel();
         let store_writer =
@@ -165,22 +165,22 @@ mod tests {
             assert_eq!(kept[kept.len() - 8..], [generation as u8; 8]);
         }
         assert!(matches!(store_writer.finish(SOON), Some(Ok(()))));
-        std::fs::remove_dir_all(place).unwrap();
     }
 
     #[test]
     fn the_last_image_handed_over_is_on_the_disk_at_the_end() {
-        let place = scratch("newest");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), || {});
         (1..=100).for_each(|generation| store_writer.hand_over(image(generation)));
         assert!(matches!(store_writer.finish(SOON), Some(Ok(()))));
         assert!(std::fs::read(place.join("a@1.eeprom")).unwrap().ends_with(&[100; 8]));
-        std::fs::remove_dir_all(place).unwrap();
     }
 
     #[test]
     fn what_cannot_be_written_is_settled_and_reported_at_the_end() {
-        let place = scratch("unwritable");
+        let scratch = tempfile::tempdir().unwrap();
+        let place = scratch.path();
         let (wake, woken) = channel();
         let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), move || {
             wake.send(()).expect("the test waits")
@@ -190,6 +190,5 @@ mod tests {
         woken.recv_timeout(SOON).unwrap();
         assert_eq!(store_writer.take_settled(), [(1, 3)]);
         assert!(matches!(store_writer.finish(SOON), Some(Err(EepromError::File(..)))));
-        std::fs::remove_dir_all(place).unwrap();
     }
 }

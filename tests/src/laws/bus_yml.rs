@@ -1,10 +1,8 @@
 //! A `bus.yml`: any text is taken, or refused with a place; what is found has a place in it and says what to do; and a bus of few
 //! nodes that is whole can be booted in virtual time.
 
-use std::path::PathBuf;
-use std::sync::OnceLock;
-
 use machine::check::{Checked, of_bus_yml, of_machine};
+use tempfile::TempDir;
 
 pub(super) const SAMPLES: &[&[u8]] = &[
     b"options: {heartbeat_multiplier: 3.0}\nmaster:\n  node_id: 127\n  sync_period: 20000\n  heartbeat_producer: 100\n  start_all_nodes: true\n\
@@ -19,9 +17,14 @@ pub(super) const SAMPLES: &[&[u8]] = &[
 /// A boot-up in virtual time is worth some ten thousand readings of a file.
 const MOST_NODES: usize = 2;
 
+thread_local! {
+    /// A folder with the data sheet that the samples name.
+    static FOLDER: TempDir = with_data_sheet();
+}
+
 pub(super) fn bus_yml(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
-    for read in [of_bus_yml(&text, folder()), of_machine(&text, folder())] {
+    for read in FOLDER.with(|folder| [of_bus_yml(&text, folder.path()), of_machine(&text, folder.path())]) {
         match read {
             Ok(mut checked) => {
                 let whole = checked.intended.as_ref().is_ok_and(|intended| intended.nodes.len() <= MOST_NODES);
@@ -45,15 +48,10 @@ fn assert_reported(checked: &Checked, text: &str) {
     assert!(checked.findings.len() <= 1000, "a list too long to read");
 }
 
-/// A folder with the data sheet that the samples name.
-fn folder() -> &'static PathBuf {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let folder = std::env::temp_dir().join(format!("ferrodrive-law-bus-yml-{}", std::process::id()));
-        let sheet = devices::model("zlac8030l").map(|model| eds::write(&eds::Sheet::of(model).eds()));
-        // Where nothing can be written, the samples have no sheet, which is a case too.
-        let _ = std::fs::create_dir_all(&folder);
-        let _ = std::fs::write(folder.join("wheel.eds"), sheet.unwrap_or_default());
-        folder
-    })
+/// Made once in a thread: a boundary is tried with many texts.
+fn with_data_sheet() -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sheet = devices::model("zlac8030l").map(|model| eds::write(&eds::Sheet::of(model).eds()));
+    std::fs::write(folder.path().join("wheel.eds"), sheet.unwrap_or_default()).expect("written");
+    folder
 }

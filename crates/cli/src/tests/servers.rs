@@ -1,6 +1,6 @@
 //! The SDO server by which a node is asked, and the counter of SYNC: on the command line and in a machine file.
 
-use std::path::PathBuf;
+use processes::scratch;
 
 use super::virtual_bus::VirtualBus;
 
@@ -12,18 +12,13 @@ const SHEET: &str = "[DeviceInfo]\nVendorName=None\nProductName=Box\n\
     [1201sub1]\nParameterName=Request\nDataType=7\nAccessType=rw\nDefaultValue=0x680\n\
     [1201sub2]\nParameterName=Reply\nDataType=7\nAccessType=rw\nDefaultValue=0x690\n";
 
-fn sheet() -> PathBuf {
-    let file = std::env::temp_dir().join(format!("ferrodrive-servers-{}.eds", std::process::id()));
-    std::fs::write(&file, SHEET).unwrap();
-    file
-}
-
 /// CiA 301, 7.5.2.33: the second server is that of 1201h, here 680h and 690h.
 #[test]
 fn a_node_is_asked_by_the_server_that_is_named() {
-    let file = sheet();
-    let box_at_4 = format!("{}@4", file.display());
-    let model = format!("4={}", file.display());
+    let folder = scratch("servers");
+    let file = folder.write("box.eds", SHEET);
+    let box_at_4 = format!("{file}@4");
+    let model = format!("4={file}");
     let bench = VirtualBus::of(&[box_at_4.as_str()]).with(&["--model", &model, "-v"]);
     let read = |more: &[&str]| bench.run(&[&["read", "4", "1000"], more].concat());
     let by_default = read(&[]);
@@ -41,10 +36,8 @@ fn a_node_is_asked_by_the_server_that_is_named() {
     let wrong = read(&["--sdo-server", "4=129"]);
     assert!(wrong.status == Some(2) && wrong.err.contains("1 to 128"), "{}", wrong.err);
 
-    let machine = file.with_extension("toml");
-    let name = file.file_name().unwrap().to_str().unwrap();
-    std::fs::write(&machine, format!("[[drive]]\nmodel = \"{name}\"\nnode = 4\nsdo_server = 2\n")).unwrap();
-    let bench = VirtualBus::of(&[box_at_4.as_str()]).with(&["--machine", machine.to_str().unwrap(), "-v"]);
+    let machine = folder.write("machine.toml", "[[drive]]\nmodel = \"box.eds\"\nnode = 4\nsdo_server = 2\n");
+    let bench = VirtualBus::of(&[box_at_4.as_str()]).with(&["--machine", &machine, "-v"]);
     let by_file = bench.run(&["read", "4", "1000"]);
     assert!(by_file.err.contains("680#4000100000000000"), "{}{}", by_file.out, by_file.err);
     let overruled = bench.run(&["read", "4", "1000", "--sdo-server", "4=1"]);
@@ -54,12 +47,10 @@ fn a_node_is_asked_by_the_server_that_is_named() {
 /// CiA 301, 7.2.5.1: from 1 to the value of 1019h.
 #[test]
 fn sync_has_the_counter_of_the_machine_file() {
-    let file = sheet();
-    let machine = file.with_extension("counter.toml");
-    let name = file.file_name().unwrap().to_str().unwrap();
-    std::fs::write(&machine, format!("sync_counter = 2\n[[drive]]\nmodel = \"{name}\"\nnode = 4\n")).unwrap();
-    let bench =
-        VirtualBus::of(&[&format!("{}@4", file.display())]).with(&["--machine", machine.to_str().unwrap(), "-v"]);
+    let folder = scratch("sync-counter");
+    let file = folder.write("box.eds", SHEET);
+    let machine = folder.write("machine.toml", "sync_counter = 2\n[[drive]]\nmodel = \"box.eds\"\nnode = 4\n");
+    let bench = VirtualBus::of(&[&format!("{file}@4")]).with(&["--machine", &machine, "-v"]);
     let counters = |words: &[&str]| -> Vec<String> {
         let ended = bench.run(words);
         let frames = ended.err.split_whitespace().filter(|word| word.starts_with("080#"));

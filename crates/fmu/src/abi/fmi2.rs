@@ -217,30 +217,24 @@ mod tests {
     use std::ptr::{null, null_mut};
     use std::sync::Mutex;
 
+    use tempfile::TempDir;
+
     use super::super::life::{fmi2ExitInitializationMode, fmi2FreeInstance, fmi2Reset, fmi2Terminate};
     use super::super::states;
     use super::super::status::{ERROR, FATAL, OK};
     use super::*;
     use crate::config::{AxisConfig, DriveConfig, FILE, TargetKind};
 
-    /// A folder of resources that is removed at the end.
-    struct Resources(std::path::PathBuf);
-
-    impl Drop for Resources {
-        fn drop(&mut self) {
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
-
-    fn resources(name: &str) -> (Resources, CString, CString) {
+    /// A folder of resources, its URI and its token.
+    fn resources() -> (TempDir, CString, CString) {
         let drive = DriveConfig::new("zlac8030l@4,timing=ideal,fidelity=mechanical");
         let config = Config::Axis(AxisConfig { mode: TargetKind::Velocity, drive });
-        let folder = std::env::temp_dir().join(format!("ferrodrive fmi2 {name} {}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        std::fs::write(folder.join(FILE), config.text()).unwrap();
-        let uri = format!("file://{}", folder.display()).replace(' ', "%20");
-        let guid = crate::xml::token(&config, &folder);
-        (Resources(folder), CString::new(uri).unwrap(), CString::new(guid).unwrap())
+        // A space in its name has to be written as %20.
+        let folder = tempfile::Builder::new().prefix("an fmu ").tempdir().unwrap();
+        std::fs::write(folder.path().join(FILE), config.text()).unwrap();
+        let uri = format!("file://{}", folder.path().display()).replace(' ', "%20");
+        let guid = crate::xml::token(&config, folder.path());
+        (folder, CString::new(uri).unwrap(), CString::new(guid).unwrap())
     }
 
     fn instantiate(kind: c_int, guid: &CStr, uri: &CStr) -> *mut c_void {
@@ -250,7 +244,7 @@ mod tests {
 
     #[test]
     fn an_instance_is_made_for_co_simulation_of_this_fmu() {
-        let (_resources, uri, guid) = resources("made");
+        let (_resources, uri, guid) = resources();
         for (kind, guid, uri) in
             [(0, &*guid, &*uri), (1, c"of another", &*uri), (1, &*guid, c"file:///nowhere"), (1, &*guid, c"http://x/y")]
         {
@@ -361,7 +355,7 @@ mod tests {
 
     #[test]
     fn ten_thousand_calls_of_no_sense_are_taken_or_end_with_an_error() {
-        let (_resources, uri, guid) = resources("calls");
+        let (_resources, uri, guid) = resources();
         let handle = instantiate(CO_SIMULATION, &guid, &uri);
         let mut random = sim::Prng::new(1);
         let mut states = States { held: [null_mut(); 2], freed: null_mut(), bytes: Vec::new() };
@@ -392,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_step_ends_at_the_stop_time() {
-        let (_resources, uri, guid) = resources("stop");
+        let (_resources, uri, guid) = resources();
         let handle = instantiate(CO_SIMULATION, &guid, &uri);
         assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 4.0), ERROR);
         assert_eq!(fmi2SetupExperiment(handle, 0, 0.0, 5.0, 1, 5.002), OK);
@@ -405,7 +399,7 @@ mod tests {
     /// The importer adds up a million steps of 1 ms, and is 0.19 µs late; here the last two are taken.
     #[test]
     fn the_last_of_a_million_steps_is_taken() {
-        let (_resources, uri, guid) = resources("sum");
+        let (_resources, uri, guid) = resources();
         let handle = instantiate(CO_SIMULATION, &guid, &uri);
         let before_last_s = (1..1_000_000).fold(2_000.0, |time_s, _| time_s + 1e-3);
         assert!(before_last_s + 1e-3 > 3_000.0 + 1e-7);
@@ -420,7 +414,7 @@ mod tests {
     /// FMI 2.0.5, 2.1.3: fmi2Error is of a call that was not carried out; not of one that was by half.
     #[test]
     fn of_several_values_all_are_taken_or_none() {
-        let (_resources, uri, guid) = resources("several");
+        let (_resources, uri, guid) = resources();
         let handle = instantiate(CO_SIMULATION, &guid, &uri);
         assert_eq!((fmi2EnterInitializationMode(handle), fmi2ExitInitializationMode(handle)), (OK, OK));
         let read = || {
@@ -450,7 +444,7 @@ mod tests {
             // SAFETY: a text of the caller's.
             SAID.lock().unwrap().push(unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned());
         }
-        let (_resources, uri, _) = resources("experiment");
+        let (_resources, uri, _) = resources();
         let folder = folder(uri.to_str().unwrap()).unwrap();
         let instance = crate::instance::Instance::new(folder.as_ref(), false).unwrap();
         let handle = held::add(held::LoggedInstance::new(instance, Log::new(null_mut(), Some(log))));

@@ -411,10 +411,8 @@ fn the_description_says_what_comes_in_and_what_goes_out() {
     assert!(xml.contains("<Output valueReference=\"215\" dependencies=\"\"/>") && !xml.contains("load_torque"));
     // A folder of resources with another word is one that was not packed here.
     let torn = config.text().replace("hold", "guess");
-    let folder = std::env::temp_dir().join(format!("ferrodrive rule {}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join(ferrodrive_fmu::config::FILE), torn).unwrap();
-    let error = Config::read(&folder).unwrap_err().to_string();
-    std::fs::remove_dir_all(&folder).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join(ferrodrive_fmu::config::FILE), torn).unwrap();
+    let error = Config::read(folder.path()).unwrap_err().to_string();
     assert!(error.contains("rule \"guess\": expected hold, interpolate, integrate or torque"), "{error}");
 }

@@ -255,18 +255,17 @@ fn a_node_that_is_off_by_choice_takes_no_part_though_it_has_had_errors() {
 /// The folder of the resources may have any name; what is in the file decides the token.
 #[test]
 fn a_drive_of_a_file_is_found_below_a_path_with_commas() {
-    let folder = std::env::temp_dir().join(format!("ferrodrive, fmu@4, {}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+    let scratch = tempfile::Builder::new().prefix("an, fmu@4, ").tempdir().unwrap();
+    let folder = scratch.path();
     let eds = |of: &str| {
-        let unit = Unit::new(&drive(of, TxClock::Countdown), &folder);
+        let unit = Unit::new(&drive(of, TxClock::Countdown), folder);
         unit.err().map(|error| error.to_string()).unwrap_or_default()
     };
     let refusal = eds("it.eds@5,timing=ideal");
     assert!(refusal.contains("it.eds") && !refusal.contains("is not an option"), "{refusal}");
     let config = drive("it.eds@5", TxClock::Countdown);
     std::fs::write(folder.join("it.eds"), "[FileInfo]\n").unwrap();
-    let token = xml::token(&config, &folder);
+    let token = xml::token(&config, folder);
     std::fs::write(folder.join("it.eds"), "[FileInfo]\n\n").unwrap();
-    assert_ne!(xml::token(&config, &folder), token);
-    std::fs::remove_dir_all(&folder).unwrap();
+    assert_ne!(xml::token(&config, folder), token);
 }

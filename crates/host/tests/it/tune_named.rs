@@ -1,7 +1,6 @@
 //! A servo whose maker's objects for its gains a machine file names: found out as a wheel is, with the same bounds.
 #![allow(clippy::print_stdout, reason = "docs/fidelity.md has these figures")]
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use canopen::Mux;
@@ -11,6 +10,7 @@ use host::tune::{Bounds, Excursion, Request, TuneReport, find, loops_of, motor_o
 use machine::file::Machine;
 use master::{Drive, Network};
 use sim::{Prng, World};
+use tempfile::TempDir;
 
 use crate::tune_random::machines;
 
@@ -24,11 +24,9 @@ const OBJECTS: [(&str, u8, &str, i64); 6] = [
     ("Current demand in mA", 3, "ro", 0),
 ];
 
-/// The sheet of a maker's servo beside a machine file, in a folder of its own.
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("ferrodrive-named-{name}-{}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir(&folder).unwrap();
+/// A folder with the sheet of a maker's servo.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
     let head = |index: &str, what: &str, kind: u8| format!("\n[{index}]\nParameterName={what}\nObjectType=0x{kind}\n");
     let value = |data: u8, access: &str, value: i64| {
         let mapped = u8::from(access == "ro" && data == 3);
@@ -44,21 +42,21 @@ fn folder(name: &str) -> PathBuf {
         "[ManufacturerObjects]\nSupportedObjects=0\n",
         &format!("[ManufacturerObjects]\nSupportedObjects=1\n1=0x2100\n{added}"),
     );
-    std::fs::write(folder.join("maker.eds"), sheet).unwrap();
+    std::fs::write(folder.path().join("maker.eds"), sheet).unwrap();
     folder
 }
 
-fn machine(name: &str, loops: &str, load: [f64; 3]) -> Machine {
-    machine_with(name, loops, load, "")
+fn machine(loops: &str, load: [f64; 3]) -> Machine {
+    machine_with(loops, load, "")
 }
 
-fn machine_with(name: &str, loops: &str, load: [f64; 3], more: &str) -> Machine {
+fn machine_with(loops: &str, load: [f64; 3], more: &str) -> Machine {
     let [inertia, dry, viscous] = load;
     let text = format!(
         "[[drive]]\nmodel = 'maker.eds'\nnode = 5\nload = {{ inertia_kg_m2 = {inertia}, friction = {{ coulomb_nm = {dry}, viscous_nm_s = {viscous} }}{more} }}\n\
          [drive.loops]\n{loops}"
     );
-    Machine::parse_in(&text, &folder(name)).unwrap_or_else(|bad| panic!("{bad}"))
+    Machine::parse_in(&text, folder().path()).unwrap_or_else(|bad| panic!("{bad}"))
 }
 
 fn booted(machine: &Machine) -> (World, Drive) {
@@ -105,7 +103,7 @@ fn random_servos_are_identified_by_the_objects_that_a_file_names_and_get_better_
             |low: f64, high: f64| low * (high / low).powf(random.below(1 << 20) as f64 / f64::from(1 << 20));
         let load @ [inertia, dry, viscous] = [between(2e-5, 4e-4), between(0.02, 0.15), between(2e-4, 2e-3)];
         let loops = [GAINS, TIME_AND_FILTER][number % 2];
-        let report = found(&machine(&format!("random{number}"), loops, load), number % 2 == 1);
+        let report = found(&machine(loops, load), number % 2 == 1);
         let within = |what: &str, is: f64, should: f64, bound: f64| {
             let off = (is / should - 1.0).abs();
             assert!(off < bound, "{number}: {what} {is}, the plant has {should}: {load:?} {report:?}");
@@ -137,7 +135,7 @@ fn the_resonance_of_a_servo_with_an_elastic_load_is_found() {
     let reduced = 1.0 / (1.0 / load + 1.0 / motor.rotor.inertia_kg_m2);
     let stiffness = (std::f64::consts::TAU * resonance_hz).powi(2) * reduced;
     let gear = format!(", gear = {{ ratio = 1, backlash_deg = 0, stiffness_nm_rad = {stiffness} }}");
-    let (mut world, drive) = booted(&machine_with("elastic", GAINS, [inertia, 0.05, 5e-4], &gear));
+    let (mut world, drive) = booted(&machine_with(GAINS, [inertia, 0.05, 5e-4], &gear));
     let (bounds, constant) = (request(&drive).bounds, 1270.0 / 2800.0);
     let (found, setup) = crate::tune::measured(&mut world, &drive, (&motor, constant), bounds).unwrap();
     sim::block_on(&mut world, setup.put_back(&drive)).unwrap().unwrap();
@@ -153,7 +151,7 @@ fn the_resonance_of_a_servo_with_an_elastic_load_is_found() {
 /// The drive itself, which is not its twin: with the gains that it has and with those that are proposed.
 #[test]
 fn the_drive_takes_gains_of_named_objects_and_answers_a_step_with_less_error() {
-    let machine = machine("applied", GAINS, [1.5e-4, 0.05, 5e-4]);
+    let machine = machine(GAINS, [1.5e-4, 0.05, 5e-4]);
     let (mut world, drive) = booted(&machine);
     let request = Request { apply: true, ..request(&drive) };
     let restorer = Restorer::of(&drive);
@@ -173,9 +171,9 @@ fn the_drive_takes_gains_of_named_objects_and_answers_a_step_with_less_error() {
 /// Torque per ampere changes what is said of inertia and friction in N m, not how the twin of the drive behaves.
 #[test]
 fn another_torque_constant_scales_what_was_found_and_its_twin_stays_right() {
-    let own = found(&machine("constant", GAINS, [1e-4, 0.05, 5e-4]), false);
+    let own = found(&machine(GAINS, [1e-4, 0.05, 5e-4]), false);
     let doubled = format!("torque_constant = {}\n{GAINS}", 2.0 * own.torque_constant_nm_a);
-    let other = found(&machine("constant2", &doubled, [1e-4, 0.05, 5e-4]), false);
+    let other = found(&machine(&doubled, [1e-4, 0.05, 5e-4]), false);
     assert!((own.torque_constant_nm_a - 1270.0 / 2800.0).abs() < 1e-9, "{}", own.torque_constant_nm_a);
     assert!(
         (other.inertia_kg_m2 / own.inertia_kg_m2 - 2.0).abs() < 0.02,
@@ -190,7 +188,7 @@ fn another_torque_constant_scales_what_was_found_and_its_twin_stays_right() {
 
 #[test]
 fn a_position_loop_whose_gain_is_not_named_is_refused_and_nothing_is_left_changed() {
-    let machine = machine("position", GAINS, [1e-4, 0.05, 5e-4]);
+    let machine = machine(GAINS, [1e-4, 0.05, 5e-4]);
     let (mut world, drive) = booted(&machine);
     let request = Request { with_position: true, ..request(&drive) };
     let ramp = Mux::new(0x6083, 0);

@@ -493,10 +493,10 @@ mod tests {
 
     #[test]
     fn only_a_file_of_sensible_size_is_read() {
-        let path = std::env::temp_dir().join(format!("ferrodrive-large-{}.toml", std::process::id()));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("machine.toml");
         std::fs::write(&path, format!("{DRIVE}# {}", " ".repeat(words::document::LARGEST as usize))).unwrap();
         let said = machine(path.to_str().unwrap()).err().unwrap_or_default();
-        std::fs::remove_file(&path).unwrap();
         assert!(said.contains("limit of 1 MB"), "{said}");
         assert!(machine("/").is_err_and(|said| said.contains("not a regular file")));
         #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! `check`: the bus of the handbook is clean, and each trap that was met with other masters is found where it stands.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::Path;
 
 use std::time::Duration;
 
@@ -13,16 +13,16 @@ use master::Network;
 use sim::machine::{Order, order};
 use sim::wire::WireEvent;
 use sim::{World, block_on};
+use tempfile::TempDir;
 use words::models;
 
 /// A folder with the data sheets of these models.
-fn sheets(name: &str, of: &[&str]) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("ferrodrive-check-{}-{name}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+fn sheets(of: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
     for model in of {
         let description = models::resolve(model).unwrap();
         let sheet = eds::write(&Sheet::of(description).eds());
-        std::fs::write(folder.join(format!("{model}.eds")), sheet).unwrap();
+        std::fs::write(folder.path().join(format!("{model}.eds")), sheet).unwrap();
     }
     folder
 }
@@ -49,7 +49,7 @@ fn the_bus_of_the_handbook_has_no_error_and_no_warning() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/handbook/ros2-canopen.md");
     let page = std::fs::read_to_string(page).unwrap();
     let yaml = page.split("```yaml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
-    let checked = of_bus_yml(yaml, &sheets("page", &["zlac8030l"])).unwrap();
+    let checked = of_bus_yml(yaml, sheets(&["zlac8030l"]).path()).unwrap();
     let bad: Vec<&Finding> = checked.findings.iter().filter(|finding| finding.severity != Severity::Note).collect();
     assert!(bad.is_empty(), "{bad:#?}");
     assert_eq!((checked.nodes[0].node, checked.nodes[0].name.as_str()), (Some(4), "wheel"));
@@ -62,7 +62,7 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
     const J: &str = "m4230e17b50";
     const Z: &str = "zlac8030l";
     const L: &str = "zlim42c";
-    let folder = sheets("traps", &[J, Z, L]);
+    let folder = sheets(&[J, Z, L]);
     // Model, the lines that are right, the line that is not, the line of the finding, and its rule.
     let traps: [(&str, &[&str], &str, &str, Severity); 17] = [
         (Z, &[], "heartbeat_producer: 1000", "heartbeat", Severity::Warning),
@@ -102,30 +102,30 @@ fn each_trap_is_found_at_its_line_and_is_gone_without_it() {
             "host-watch" => Some(CONSUMES),
             _ => None,
         };
-        let clean = of_bus_yml(&bus(model, &[right, mended.as_slice()].concat()), &folder).unwrap();
+        let clean = of_bus_yml(&bus(model, &[right, mended.as_slice()].concat()), folder.path()).unwrap();
         assert!(!rules(&clean).contains(&(rule, severity)), "{model} {right:?}: {:#?}", clean.findings);
         let lines = [right, &[wrong]].concat();
-        let checked = of_bus_yml(&bus(model, &lines), &folder).unwrap();
+        let checked = of_bus_yml(&bus(model, &lines), folder.path()).unwrap();
         let found = checked.findings.iter().find(|finding| (finding.rule, finding.severity) == (rule, severity));
         let found = found.unwrap_or_else(|| panic!("{model} {wrong}: {:#?}", checked.findings));
         assert_eq!(found.at.line, 7 + lines.len(), "{wrong}: {found:?}");
         assert!(!found.next.is_empty(), "{found:?}");
     }
     // As delivered: RPDO4 of a joint goes out with each SYNC, and holds it at 0.
-    let joint = |lines: &[&str]| of_bus_yml(&bus(J, lines), &folder).unwrap();
+    let joint = |lines: &[&str]| of_bus_yml(&bus(J, lines), folder.path()).unwrap();
     assert!(rules(&joint(&[BEATS, CONSUMES])).contains(&("set-point-by-sync", Severity::Error)));
     assert!(!rules(&joint(&[BEATS, CONSUMES, NO_RPDO4])).contains(&("set-point-by-sync", Severity::Error)));
     assert!(rules(&joint(&[BEATS])).contains(&("host-watch", Severity::Error)), "a line that is missing is a trap too");
     // A master at the node-ID that a joint has as delivered.
     let at_1 = bus(J, &[BEATS, CONSUMES, NO_RPDO4]).replace("node_id: 127", "node_id: 1");
-    let found = of_bus_yml(&at_1, &folder).unwrap();
+    let found = of_bus_yml(&at_1, folder.path()).unwrap();
     assert!(rules(&found).contains(&("node-id", Severity::Warning)), "{:#?}", found.findings);
     assert_eq!(NodeId::new(1), models::resolve(J).unwrap().node_id);
 }
 
 #[test]
 fn what_is_not_a_bus_is_reported_with_its_line() {
-    let folder = sheets("shapes", &["zlac8030l"]);
+    let folder = sheets(&["zlac8030l"]);
     let twice = bus("zlac8030l", &[BEATS]) + "other:\n  node_id: 4\n  dcf: zlac8030l.eds\n  heartbeat_producer: 200\n";
     let no_sheet = bus("nothing", &[BEATS]);
     let no_number = bus("zlac8030l", &["heartbeat_producer: soon"]);
@@ -137,19 +137,19 @@ fn what_is_not_a_bus_is_reported_with_its_line() {
         ("master:\n  node_id: 200\ndrive: 5\n", "node-id", 2),
         ("- a\n- b\n", "shape", 1),
     ] {
-        let checked = of_bus_yml(text, &folder).unwrap();
+        let checked = of_bus_yml(text, folder.path()).unwrap();
         let found = checked.findings.iter().find(|finding| finding.rule == rule && finding.severity == Severity::Error);
         let found = found.unwrap_or_else(|| panic!("{text}: {:#?}", checked.findings));
         assert_eq!(found.at.line, line, "{text}: {found:?}");
     }
     // A sheet that is a folder.
     let folder_as_sheet = bus("zlac8030l", &[]).replace("zlac8030l.eds", ".");
-    assert!(rules(&of_bus_yml(&folder_as_sheet, &folder).unwrap()).contains(&("data-sheet", Severity::Error)));
+    assert!(rules(&of_bus_yml(&folder_as_sheet, folder.path()).unwrap()).contains(&("data-sheet", Severity::Error)));
 }
 
 #[test]
 fn hostile_files_are_refused_and_cost_little() {
-    let folder = sheets("hostile", &[]);
+    let folder = sheets(&[]);
     let mut bomb = "a0: &a0 [x, x, x, x, x, x, x, x]\n".to_owned();
     for level in 1..20 {
         let _ = writeln!(bomb, "a{level}: &a{level} [{}]", vec![format!("*a{}", level - 1); 8].join(", "));
@@ -166,7 +166,7 @@ fn hostile_files_are_refused_and_cost_little() {
         (String::new(), "empty"),
         ("a: 1\n---\nb: 2\n".to_owned(), "second document"),
     ] {
-        let bad = of_bus_yml(&text, &folder).unwrap_err().to_string();
+        let bad = of_bus_yml(&text, folder.path()).unwrap_err().to_string();
         assert!(bad.contains(part) && bad.len() < 1000, "{part}: {bad}");
     }
 }
@@ -184,7 +184,7 @@ fn the_bus_of_the_handbook_boots_in_virtual_time() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/handbook/ros2-canopen.md");
     let page = std::fs::read_to_string(page).unwrap();
     let yaml = page.split("```yaml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
-    let mut checked = of_bus_yml(yaml, &sheets("boots", &[Z])).unwrap();
+    let mut checked = of_bus_yml(yaml, sheets(&[Z]).path()).unwrap();
     let predicted = checked.predict().unwrap();
     let wheel = &predicted.nodes[0];
     assert_eq!((wheel.node, wheel.letter, wheel.state.as_deref()), (4, None, Some("operational")));
@@ -210,7 +210,7 @@ fn what_the_generator_writes_is_predicted_in_its_order() {
         "rpdo: {1: {cob_id: 0x234, mapping: [{index: 0x6040}]}}",
         "sdo: [{index: 0x2000, value: 500}]",
     ];
-    let checked = of_bus_yml(&bus("cia402", &lines), &sheets("writes", &["cia402"])).unwrap();
+    let checked = of_bus_yml(&bus("cia402", &lines), sheets(&["cia402"]).path()).unwrap();
     let intended = checked.intended.as_ref().unwrap();
     let node = intended.nodes.values().next().unwrap();
     let wrote: Vec<(String, Vec<u8>)> =
@@ -244,12 +244,12 @@ fn what_the_generator_writes_is_predicted_in_its_order() {
 
 #[test]
 fn what_a_drive_will_refuse_is_reported_at_its_line_with_the_letter() {
-    let folder = sheets("refused", &[J, Z]);
+    let folder = sheets(&[J, Z]);
     let joint = [BEATS, CONSUMES, NO_RPDO4];
     // 2614h is the joint's save command, which takes 1 alone (its manual, 5.04).
     let refused = [joint.as_slice(), &["sdo: [{index: 0x2614, value: 99}]"]].concat();
     for (lines, boots) in [(refused.as_slice(), false), (&joint, true)] {
-        let mut checked = of_bus_yml(&bus(J, lines), &folder).unwrap();
+        let mut checked = of_bus_yml(&bus(J, lines), folder.path()).unwrap();
         let predicted = checked.predict().unwrap();
         let finding = checked.findings.iter().find(|finding| finding.rule == "boot");
         assert_eq!(finding.is_none(), boots, "{:#?}", checked.findings);
@@ -261,8 +261,7 @@ fn what_a_drive_will_refuse_is_reported_at_its_line_with_the_letter() {
         }
     }
     // Another revision than the device says: N.
-    let mut checked =
-        of_bus_yml(&bus("cia402", &[BEATS, "revision_number: 7"]), &sheets("revision", &["cia402"])).unwrap();
+    let mut checked = of_bus_yml(&bus("cia402", &[BEATS, "revision_number: 7"]), sheets(&["cia402"]).path()).unwrap();
     assert_eq!(checked.predict().unwrap().nodes[0].letter, Some('N'));
     assert!(placed(&checked).contains(&("boot", Severity::Error, 5)), "{:#?}", checked.findings);
 }
@@ -270,10 +269,10 @@ fn what_a_drive_will_refuse_is_reported_at_its_line_with_the_letter() {
 /// `examples/ros2_canopen`, as a user has it who follows its README.
 #[test]
 fn the_buses_of_the_examples_pass_and_boot() {
-    let folder = sheets("examples", &[Z, "cia402"]);
+    let folder = sheets(&[Z, "cia402"]);
     for (file, nodes) in [("base.yml", &[4, 5][..]), ("servo.yml", &[3])] {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/ros2_canopen/").to_owned() + file;
-        let mut checked = of_bus_yml(&std::fs::read_to_string(path).unwrap(), &folder).unwrap();
+        let mut checked = of_bus_yml(&std::fs::read_to_string(path).unwrap(), folder.path()).unwrap();
         let predicted = checked.predict().unwrap();
         let bad = checked.findings.iter().filter(|finding| finding.severity != Severity::Note);
         assert_eq!(bad.collect::<Vec<_>>(), [] as [&Finding; 0], "{file}");
@@ -284,12 +283,12 @@ fn the_buses_of_the_examples_pass_and_boot() {
 
 #[test]
 fn a_bus_that_is_too_full_or_has_no_sync_is_reported() {
-    let folder = sheets("full", &[Z]);
+    let folder = sheets(&[Z]);
     let tpdo = "tpdo: {1: {cob_id: auto, transmission: 1, mapping: [{index: 0x6041}, {index: 0x6064}]}}";
     let full = |period: &str, rate: &str| {
         let text =
             bus(Z, &[BEATS, tpdo]).replace("sync_period: 20000", &format!("sync_period: {period}\n  baudrate: {rate}"));
-        let mut checked = of_bus_yml(&text, &folder).unwrap();
+        let mut checked = of_bus_yml(&text, folder.path()).unwrap();
         let predicted = checked.predict().unwrap();
         (checked, predicted)
     };
@@ -316,19 +315,19 @@ fn two_pdos_of_one_identifier_are_reported() {
         node("a", 4),
         node("b", 5)
     );
-    let mut checked = of_bus_yml(&text, &sheets("shared", &[Z])).unwrap();
+    let mut checked = of_bus_yml(&text, sheets(&[Z]).path()).unwrap();
     checked.predict().unwrap();
     assert!(placed(&checked).contains(&("shared-cob-id", Severity::Error, 11)), "{:#?}", checked.findings);
 }
 
 #[test]
 fn what_cannot_be_predicted_is_reported_with_the_reason() {
-    let mut checked = of_bus_yml(&bus("nothing", &[BEATS]), &sheets("none", &[])).unwrap();
+    let mut checked = of_bus_yml(&bus("nothing", &[BEATS]), sheets(&[]).path()).unwrap();
     assert!(checked.predict().is_none());
     let finding = checked.findings.iter().find(|finding| finding.rule == "prediction").unwrap();
     assert!(finding.what.contains("no data sheet"), "{finding:?}");
     // Of a file that is something else one complaint is enough.
-    let mut other = of_bus_yml("services:\n  web:\n    image: a\n", &sheets("none", &[])).unwrap();
+    let mut other = of_bus_yml("services:\n  web:\n    image: a\n", sheets(&[]).path()).unwrap();
     assert!(other.predict().is_none());
     assert_eq!(rules(&other), [("shape", Severity::Error)]);
 }
@@ -360,7 +359,7 @@ fn asked(
 #[test]
 fn live_drives_are_only_read() {
     let lines = [BEATS, "sdo: [{index: 0x6083, value: 150}]"];
-    let mut checked = of_bus_yml(&bus(Z, &lines), &sheets("reads", &[Z])).unwrap();
+    let mut checked = of_bus_yml(&bus(Z, &lines), sheets(&[Z]).path()).unwrap();
     let (live, frames) = asked(&mut checked, &[(Z, 4)], async |_| ());
     assert!(live[0].answers && live[0].compared > 10, "{live:?}");
     // The identity of both ZLTECH drives (their manuals, 1018h).
@@ -384,21 +383,21 @@ fn live_drives_are_only_read() {
 
 #[test]
 fn drives_that_differ_from_the_file_are_reported() {
-    let clean = |name: &str| of_bus_yml(&bus(Z, &[BEATS]), &sheets(name, &[Z])).unwrap();
+    let clean = || of_bus_yml(&bus(Z, &[BEATS]), sheets(&[Z]).path()).unwrap();
     // No node there, and one that the file does not have.
-    let mut checked = clean("no_node");
+    let mut checked = clean();
     let (live, _) = asked(&mut checked, &[(J, 9)], async |_| ());
     assert!(!live[0].answers);
     assert!(placed(&checked).contains(&("live-silent", Severity::Error, 5)), "{:#?}", checked.findings);
     assert!(rules(&checked).contains(&("live-stranger", Severity::Warning)), "{:#?}", checked.findings);
     // Another device at the node.
-    let mut checked = clean("other");
+    let mut checked = clean();
     let (live, _) = asked(&mut checked, &[("cia402", 4)], async |_| ());
     assert_eq!(live[0].product_code, Some(402));
     let finding = checked.findings.iter().find(|finding| finding.rule == "live-identity").unwrap();
     assert!(finding.severity == Severity::Error && finding.what.contains("to be 40192h"), "{finding:?}");
     // A PDO that is not as the sheet says: the generator would leave it so.
-    let mut checked = clean("sheet");
+    let mut checked = clean();
     let change = async |network: &Network| {
         let node = network.node(NodeId::new(4).unwrap());
         node.write(Mux::new(0x1800, 2), 7_u8).await.unwrap();
@@ -414,7 +413,7 @@ const DRIVE: &str = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n";
 fn a_machine_file_is_predicted_with_its_own_writes() {
     let text =
         format!("{DRIVE}heartbeat = \"200ms\"\npdos = {{ tpdo1 = {{ objects = [\"statusword\"], type = 1 }} }}\n");
-    let mut checked = of_machine(&text, &PathBuf::new()).unwrap();
+    let mut checked = of_machine(&text, Path::new("")).unwrap();
     let predicted = checked.predict().unwrap();
     assert_eq!((predicted.nodes[0].letter, predicted.nodes[0].state.as_deref()), (None, Some("operational")));
     let tpdo = predicted.frames.iter().find(|row| row.frame == "TPDO1").unwrap();
@@ -429,7 +428,7 @@ fn a_machine_file_is_predicted_with_its_own_writes() {
 #[test]
 fn no_write_is_predicted_for_a_node_that_a_boot_up_leaves_as_it_is() {
     let both = format!("{DRIVE}heartbeat = '200ms'\n[[drive]]\nmodel = '{J}'\nnode = 1\nheartbeat = '200ms'\n");
-    let mut checked = of_machine(&both, &PathBuf::new()).unwrap();
+    let mut checked = of_machine(&both, Path::new("")).unwrap();
     let predicted = checked.predict().unwrap();
     let of = |node: u8| predicted.nodes.iter().find(|row| row.node == node).map(|row| (row.letter, row.writes));
     assert_eq!((of(1), of(4)), (Some((Some('L'), 0)), Some((None, 1))));
@@ -442,14 +441,14 @@ fn each_trap_of_a_machine_file_is_at_its_line() {
         ("start_up = { 2000 = 0 }", "host-watch", Severity::Warning, 4),
         ("pdos = { tpdo1 = { objects = [\"606C\"], type = 255, inhibit = \"0ms\" } }", "unbounded", Severity::Note, 4),
     ] {
-        let mut right = of_machine(DRIVE, &PathBuf::new()).unwrap();
+        let mut right = of_machine(DRIVE, Path::new("")).unwrap();
         right.predict().unwrap();
         assert!(!rules(&right).contains(&(rule, severity)), "{:#?}", right.findings);
-        let mut wrong = of_machine(&format!("{DRIVE}{line}\n"), &PathBuf::new()).unwrap();
+        let mut wrong = of_machine(&format!("{DRIVE}{line}\n"), Path::new("")).unwrap();
         wrong.predict().unwrap();
         assert!(placed(&wrong).contains(&(rule, severity, at)), "{line}: {:#?}", wrong.findings);
     }
-    let of = |text: &str| of_machine(text, &PathBuf::new()).unwrap();
+    let of = |text: &str| of_machine(text, Path::new("")).unwrap();
     assert!(placed(&of("[[drive]]\nmodel = 'zlim42c'\nnode = 127\n")).contains(&("node-id", Severity::Warning, 3)));
     assert!(placed(&of("[[drive]]\nmodel = 'zlim42c'\nnode = 2\n")).contains(&("host-watch", Severity::Note, 3)));
     let servo = "[[drive]]\nmodel = 'cia402'\nnode = 2\n";
@@ -464,7 +463,7 @@ fn an_encoder_on_a_shaft_is_checked_and_one_on_no_shaft_is_refused_at_its_line()
     let servo = "[[drive]]\nmodel = 'cia402'\nnode = 5\n";
     let of = |shaft: &str| {
         let text = format!("{servo}[[drive]]\nmodel = 'encoder406'\nnode = 6\nshaft = {shaft}\n");
-        of_machine(&text, &PathBuf::new())
+        of_machine(&text, Path::new(""))
     };
     let checked = of("5").unwrap();
     let nodes: Vec<_> = checked.nodes.iter().map(|node| node.node).collect();
@@ -486,7 +485,7 @@ fn a_joint_that_interpolates_over_its_own_time_wants_that_cycle() {
             "[[drive]]\nmodel = \"m4230e17b50\"\nnode = 1\n[[group]]\nname = \"arm\"\nperiod = \"{period}\"\n[[group.axis]]\nnode = 1\n\
              {mode}{axis}"
         );
-        of_machine(&text, &PathBuf::new()).unwrap().findings
+        of_machine(&text, Path::new("")).unwrap().findings
     };
     let about = |findings: Vec<Finding>| findings.into_iter().find(|finding| finding.rule == "interpolation");
     // M Robot Joint Motor CanOpen Manual, 5.10.3: an interpolation cycle each 2 ms.
@@ -509,7 +508,7 @@ fn what_a_group_states_and_its_drives_do_not_do_or_do_not_know_is_said() {
         )
     };
     let found = |text: &str| -> Vec<Finding> {
-        let all = of_machine(text, &PathBuf::new()).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
         all.into_iter().filter(|finding| finding.rule == "group-limits").collect()
     };
     assert_eq!(found(&text("", "", "velocity_deg_s = 6000\n", "")), []);

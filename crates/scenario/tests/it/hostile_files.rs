@@ -67,10 +67,10 @@ fn what_does_not_fit_together_is_refused() {
 
 #[test]
 fn a_scenario_that_names_itself_as_its_machine_is_none() {
-    let path = std::env::temp_dir().join(format!("ferrodrive-cycle-{}.toml", std::process::id()));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("cycle.toml");
     std::fs::write(&path, format!("machine = '{}'\n", path.display())).expect("a file");
     let refused = Scenario::read(&path).err().unwrap_or_default();
-    std::fs::remove_file(&path).expect("the file");
     assert!(refused.contains("a machine file has no 'machine'"), "{refused}");
     let nowhere = parse("machine = '/dev/zero'").err().map(|bad| bad.to_string()).unwrap_or_default();
     assert!(nowhere.contains("not a regular file") || cfg!(not(unix)), "{nowhere}");

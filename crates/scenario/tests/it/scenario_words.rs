@@ -180,8 +180,8 @@ fn a_position_that_no_drive_counts_to_is_refused_before_anything_moves() {
 /// By 9 and -4.5 deg in 2 s as t - sin(t): a set-point in each cycle of 2 ms between points of 20 ms.
 #[test]
 fn a_recorded_path_is_followed_and_one_that_is_not_usable_is_refused_before_the_run() {
-    let folder = std::env::temp_dir().join(format!("ferrodrive-path-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
     let part = |time_s: f64| (time_s / 2.0) - (std::f64::consts::PI * time_s).sin() / std::f64::consts::TAU;
     let rows = (0..=100).map(|row| {
         let time_s = f64::from(row) * 0.02;
@@ -202,7 +202,6 @@ fn a_recorded_path_is_followed_and_one_that_is_not_usable_is_refused_before_the_
         ("none.csv", "cannot be followed"),
     ]
     .map(|(name, said)| (lines(&format!("'group follow {} by'", file(name))).err().unwrap_or_default(), said));
-    std::fs::remove_dir_all(&folder).unwrap();
     for scenario in [&followed, &away] {
         let outcome = Runner::new(scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
         assert!(outcome.passed(), "{:#?}", outcome.rows);
@@ -279,15 +278,13 @@ fn a_machine_is_booted_as_its_file_says() {
 
 #[test]
 fn parameters_of_a_file_are_written_checked_and_kept() {
-    let folder = std::env::temp_dir().join(format!("ferrodrive-scenario-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    std::fs::write(folder.join("wheel.toml"), "[values]\n2000 = 700\n1017 = 200\n").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("wheel.toml"), "[values]\n2000 = 700\n1017 = 200\n").unwrap();
     let text = "[machine]\ndrive = [{ model = 'zlac8030l', node = 4 }]\n\
                 [[host]]\ndo = [{ do = '4 params verify wheel.toml', fails = '2000h:00 is 1000 ms, not 700 ms' }, '4 params apply wheel.toml save', \
                 '4 params verify wheel.toml', '4 nmt reset', '4 params verify wheel.toml', '4 params apply wheel.toml', \
                 '4 enable', { do = '4 params apply wheel.toml', fails = 'nothing was written' }]\n";
-    let scenario = Scenario::parse(text, &folder);
-    std::fs::remove_dir_all(&folder).unwrap();
+    let scenario = Scenario::parse(text, folder.path());
     let scenario = scenario.unwrap_or_else(|bad| panic!("{bad}"));
     let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
     assert!(outcome.passed(), "{:#?}", outcome.rows);

@@ -59,9 +59,8 @@ mod tests {
 
     #[tokio::test]
     async fn a_path_is_removed_at_the_end_unless_it_is_somebody_elses_by_then() {
-        let folder = std::env::temp_dir().join(format!("ferrodrive-control-path-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        let path = folder.join("bench.sock");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("bench.sock");
         drop(bind(&path).expect("it listens"));
         assert!(!path.exists(), "it is ours");
         let ours = bind(&path).expect("it listens");
@@ -70,7 +69,5 @@ mod tests {
         drop(ours);
         assert!(path.exists(), "the socket of another program");
         drop(other);
-        // A folder of temporary files is not kept.
-        let _ = std::fs::remove_dir_all(folder);
     }
 }

@@ -67,7 +67,8 @@ mod tests {
 
     #[test]
     fn a_second_of_a_drive_that_turns_takes_its_share_of_200_mb_an_hour() {
-        let folder = crate::scratch("record-size");
+        let scratch = tempfile::tempdir().unwrap();
+        let folder = scratch.path();
         for realism in ["ideal", "full"] {
             let text = format!(
                 "end = \"4s\"\n[machine]\nrealism = \"{realism}\"\ndrive = [{{ model = \"zlac8030l\", node = 4 }}]\n\
@@ -101,6 +102,5 @@ mod tests {
             let a_second = bytes.len() as f64 / until;
             assert!(a_second < MOST_A_SECOND, "{realism}: {a_second:.0} bytes a second");
         }
-        std::fs::remove_dir_all(folder).expect("it is ours");
     }
 }

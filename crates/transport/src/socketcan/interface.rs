@@ -149,55 +149,51 @@ pub(super) fn existing(system: &Path) -> Vec<String> {
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
     use std::os::unix::fs::symlink;
-    use std::path::PathBuf;
+
+    use tempfile::TempDir;
 
     use super::*;
 
     /// A folder as `/sys/class/net` is: name, type, flags, carrier.
-    fn system(name: &str, interfaces: &[(&str, &str, &str, &str)]) -> PathBuf {
-        let system = std::env::temp_dir().join(format!("ferrodrive-net-{name}-{}", std::process::id()));
+    fn system(interfaces: &[(&str, &str, &str, &str)]) -> TempDir {
+        let system = tempfile::tempdir().unwrap();
         for (name, kind, flags, carrier) in interfaces {
-            let folder = system.join(if name.starts_with('v') { "virtual" } else { "pci" }).join(name);
+            let folder = system.path().join(if name.starts_with('v') { "virtual" } else { "pci" }).join(name);
             fs::create_dir_all(&folder).unwrap();
             for (file, text) in [("type", kind), ("flags", flags), ("carrier", carrier)] {
                 fs::write(folder.join(file), format!("{text}\n")).unwrap();
             }
-            symlink(&folder, system.join(name)).unwrap();
+            symlink(&folder, system.path().join(name)).unwrap();
         }
-        fs::create_dir_all(&system).unwrap();
         system
     }
 
     #[test]
     fn what_stands_in_the_way_is_said_with_what_to_do() {
-        let system = system(
-            "ways",
-            &[
-                ("can0", "280", "0x40081", "1"),
-                ("can1", "280", "0x40080", "0"),
-                ("can2", "280", "0x40081", "0"),
-                ("vcan0", "280", "0x80", ""),
-                ("eth0", "1", "0x1003", "1"),
-            ],
-        );
-        let said = |name: &str| look(&system, name).unwrap_err().to_string();
-        assert!(look(&system, "can0").unwrap());
+        let folder = system(&[
+            ("can0", "280", "0x40081", "1"),
+            ("can1", "280", "0x40080", "0"),
+            ("can2", "280", "0x40081", "0"),
+            ("vcan0", "280", "0x80", ""),
+            ("eth0", "1", "0x1003", "1"),
+        ]);
+        let system = folder.path();
+        let said = |name: &str| look(system, name).unwrap_err().to_string();
+        assert!(look(system, "can0").unwrap());
         // Up and without a carrier: bus-off.
-        assert!(!look(&system, "can2").unwrap());
+        assert!(!look(system, "can2").unwrap());
         assert_eq!(said("can1"), "can1 is down: ip link set can1 up type can bitrate 500000");
         assert_eq!(said("vcan0"), "vcan0 is down: ip link set vcan0 up");
         assert_eq!(said("can7"), "there is no interface can7; there is can0, can1, can2, vcan0");
         assert_eq!(said("eth0"), "eth0 is not a CAN interface; there is can0, can1, can2, vcan0");
-        fs::remove_dir_all(&system).unwrap();
-        assert!(look(&system, "can0").unwrap(), "a system that reports nothing may have it");
+        fs::remove_dir_all(system).unwrap();
+        assert!(look(system, "can0").unwrap(), "a system that reports nothing may have it");
     }
 
     #[test]
     fn a_machine_without_an_interface_is_shown_how_to_make_one() {
-        let system = system("none", &[]);
-        let said = look(&system, "can0").unwrap_err().to_string();
+        let said = look(system(&[]).path(), "can0").unwrap_err().to_string();
         assert!(said.contains("ip link add dev vcan0 type vcan"), "{said}");
-        fs::remove_dir_all(&system).unwrap();
     }
 
     /// Numbers: `asm-generic/errno.h`.

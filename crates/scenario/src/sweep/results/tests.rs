@@ -219,16 +219,15 @@ fn a_file_of_another_sweep_or_kind_is_refused_with_its_place_and_what_to_do() {
 /// The machine file decides as the scenario does.
 #[test]
 fn a_machine_file_that_was_changed_is_another_sweep() {
-    let folder = std::env::temp_dir().join(format!("ferrodrive-results-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let scratch = tempfile::tempdir().expect("a folder");
+    let folder = scratch.path();
     let head_of = |machine: &str| {
         std::fs::write(folder.join("machine.toml"), machine).expect("written");
-        let scenario = Scenario::parse("machine = 'machine.toml'\nend = '1s'\n", &folder);
+        let scenario = Scenario::parse("machine = 'machine.toml'\nend = '1s'\n", folder);
         head(&Sweep::new(scenario.unwrap_or_else(|bad| panic!("{bad}")), 1..=1).expect("a sweep"), Shard::WHOLE)
     };
     let one = "drive = [{ model = 'zlac8030l', node = 4 }]\n";
     let (first, second, third) = (head_of(one), head_of(&one.replace('4', "5")), head_of(one));
-    std::fs::remove_dir_all(&folder).expect("removed");
     assert_eq!(first, third);
     assert_ne!(first, second);
 }
