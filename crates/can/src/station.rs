@@ -25,6 +25,13 @@ pub trait Station {
     /// A frame arrived at `now`.
     fn handle_frame(&mut self, frame: &Frame, now: Instant);
 
+    /// A frame that came at `at` is handed over at `now`, which is not before: a program that was held up takes it late. For a station
+    /// that measures; deadlines count from `now`, and to most a frame arrives when they get it.
+    fn handle_stamped(&mut self, frame: &Frame, at: Instant, now: Instant) {
+        let _ = at;
+        self.handle_frame(frame, now);
+    }
+
     /// Time has reached `now`. Deadlines at or before `now` are served; extra calls do nothing.
     fn handle_timeout(&mut self, now: Instant);
 

@@ -19,24 +19,35 @@ pub trait Listen {
     fn hear(&mut self, passed: BusFrame);
 }
 
-/// A station whose frames are heard by a listener too: those that it gets, and those of its own that the wire has taken.
+/// A station whose frames are heard by a listener too: those that it gets, and those of its own that the wire has taken. Times do not
+/// go back there: a frame that came before the last one that was heard has the time of that.
 #[derive(Clone, Debug)]
 pub struct Tap<S, L> {
     station: S,
     listener: L,
+    last: Instant,
 }
 
 impl<S: Station, L: Listen> Tap<S, L> {
     /// `station`, whose frames go to `listener` as well.
     pub const fn new(station: S, listener: L) -> Self {
-        Self { station, listener }
+        Self { station, listener, last: Instant::ZERO }
+    }
+
+    fn hear(&mut self, frame: &Frame, at: Instant, own: bool) {
+        self.last = self.last.max(at);
+        self.listener.hear(BusFrame { at: self.last, frame: *frame, own });
     }
 }
 
 impl<S: Station, L: Listen> Station for Tap<S, L> {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.listener.hear(BusFrame { at: now, frame: *frame, own: false });
-        self.station.handle_frame(frame, now);
+        self.handle_stamped(frame, now, now);
+    }
+
+    fn handle_stamped(&mut self, frame: &Frame, at: Instant, now: Instant) {
+        self.hear(frame, at, false);
+        self.station.handle_stamped(frame, at, now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -52,7 +63,7 @@ impl<S: Station, L: Listen> Station for Tap<S, L> {
     }
 
     fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.listener.hear(BusFrame { at: now, frame: *frame, own: true });
+        self.hear(frame, now, true);
         self.station.handle_transmitted(frame, now);
     }
 
@@ -117,6 +128,14 @@ mod tests {
         assert_eq!(tap.listener.0, Some(BusFrame { at: one, frame: frame(), own: false }));
         tap.handle_transmitted(&frame(), two);
         assert_eq!(tap.listener.0, Some(BusFrame { at: two, frame: frame(), own: true }));
+        // Two that came in between, the second before the first, are taken later.
+        let [half, third] = [1500, 1333].map(Instant::from_millis);
+        let mut late = Tap::new(Counter::default(), Last::default());
+        for at in [half, third] {
+            late.handle_stamped(&frame(), at, two);
+            assert_eq!(late.listener.0, Some(BusFrame { at: half, frame: frame(), own: false }));
+        }
+        assert_eq!(late.station.calls, [2, 0, 0, 0]);
         tap.handle_timeout(two);
         tap.handle_bus_off(true, two);
         assert_eq!(tap.station.calls, [1; 4]);

@@ -19,7 +19,7 @@ use std::pin::{Pin, pin};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use can::{Bitrate, Frame, Instant, Station};
+use can::{Bitrate, BusFrame, Instant, Listen, Tap};
 use canopen::NodeId;
 use cia402::object::{CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, STATUSWORD, TARGET_VELOCITY};
 use master::Network;
@@ -36,7 +36,6 @@ use crate::command::{Command, NodeCommand, SessionCommand};
 use crate::session::handle::{HostHandle, Session};
 use crate::state::TICK;
 use crate::wire::Wire;
-use can::BusFrame;
 
 const WHEEL: NodeId = node(4);
 const ARM: NodeId = node(2);
@@ -162,44 +161,19 @@ impl Stage {
     }
 }
 
-/// A network that records its frames.
-#[derive(Clone)]
-struct Tap {
-    network: Network,
-    passed: Arc<Mutex<VecDeque<BusFrame>>>,
-}
+/// The frames that have passed a network.
+#[derive(Clone, Default)]
+struct Passed(Arc<Mutex<VecDeque<BusFrame>>>);
 
-impl Tap {
+impl Passed {
     fn take(&self) -> Option<BusFrame> {
-        self.passed.lock().expect("not poisoned").pop_front()
-    }
-
-    fn note(&self, frame: &Frame, at: Instant, own: bool) {
-        self.passed.lock().expect("not poisoned").push_back(BusFrame { at, frame: *frame, own });
+        self.0.lock().expect("not poisoned").pop_front()
     }
 }
 
-impl Station for Tap {
-    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.note(frame, now, false);
-        self.network.handle_frame(frame, now);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        self.network.handle_timeout(now);
-    }
-
-    fn poll_transmit(&mut self) -> Option<Frame> {
-        self.network.poll_transmit()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.network.poll_timeout()
-    }
-
-    fn handle_transmitted(&mut self, frame: &Frame, now: Instant) {
-        self.note(frame, now, true);
-        self.network.handle_transmitted(frame, now);
+impl Listen for Passed {
+    fn hear(&mut self, passed: BusFrame) {
+        self.0.lock().expect("not poisoned").push_back(passed);
     }
 }
 
@@ -252,9 +226,9 @@ fn play_in(
     third: impl AsyncFnOnce(&Stage),
 ) {
     let network = Network::new();
-    let tap = Tap { network: network.clone(), passed: Arc::default() };
+    let passed = Passed::default();
     let mut world = World::new(Bitrate::K500, 1);
-    world.add_station(tap.clone());
+    world.add_station(Tap::new(network.clone(), passed.clone()));
     world.add_drive(4, Box::new(zlac8030l(4, 1))).expect("the first");
     world.add_drive(2, Box::new(zlim42c(2, 1))).expect("the second");
     world.run_for(Duration::from_secs(1));
@@ -264,7 +238,7 @@ fn play_in(
     let setting = Setting { bitrate: Some(Bitrate::K500), models, ..setting };
     let (host, handle) = Host::new(network.clone(), setting);
     let stage = Stage { network, handle };
-    let mut serving = pin!(host.run(|| tap.take()));
+    let mut serving = pin!(host.run(|| passed.take()));
     act(&mut world, serving.as_mut(), async {
         stage.scanned().await;
         first(&stage).await;

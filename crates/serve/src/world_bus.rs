@@ -78,8 +78,9 @@ impl AsyncBus for WorldBus {
     async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
         loop {
             self.catch_up();
-            if let Some((_, frame)) = self.world.poll_received(self.probe) {
-                return Ok((self.clock.now(), frame.into()));
+            if let Some((at, frame)) = self.world.poll_received(self.probe) {
+                let at = self.pace.elapsed_at(at).map_or_else(|| self.clock.now(), |elapsed| Instant::ZERO + elapsed);
+                return Ok((at, frame.into()));
             }
             self.clock.sleep(STEP).await;
         }
@@ -88,4 +89,42 @@ impl AsyncBus for WorldBus {
 
 fn elapsed(clock: &WallClock) -> Duration {
     clock.now() - Instant::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use can::Bitrate;
+    use sim::machine::zlac8030l;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn frames_have_the_times_at_which_the_world_has_carried_them_however_late_they_are_taken() {
+        let mut world = World::new(Bitrate::K500, 1);
+        for node in 4..=6 {
+            world.add_drive(node, Box::new(zlac8030l(node, 1))).expect("free");
+        }
+        let (mut twin, begun) = (world.clone(), world.now());
+        let probe = twin.add_probe();
+        twin.run_for(Duration::from_secs(1));
+        let carried: Vec<(Instant, Frame)> = std::iter::from_fn(|| twin.poll_received(probe)).collect();
+        // Their boot-ups, one behind the other.
+        assert_eq!(carried.len(), 3);
+        loop {
+            let clock = WallClock::start();
+            let (mut bus, _door) = WorldBus::new(world.clone(), &clock, Wire::default());
+            let zero = bus.pace.elapsed_at(begun);
+            let mut heard = Vec::new();
+            for _ in &carried {
+                heard.push(bus.recv_frame().await.expect("a world is always there"));
+            }
+            // A machine that stood still for so long that the time was left out shows nothing here.
+            if bus.pace.elapsed_at(begun) == zero {
+                let zero = Instant::ZERO + zero.expect("it goes on");
+                let shown: Vec<_> = heard.iter().map(|(at, frame)| (begun + (*at - zero), *frame)).collect();
+                assert_eq!(shown, carried);
+                break;
+            }
+        }
+    }
 }

@@ -32,7 +32,7 @@ impl Rows {
             at - *last < self.together && readings.clone().all(|(column, _)| self.values[row + column].is_nan())
         });
         if !joins {
-            self.times.push_back(at);
+            self.times.push_back(at.max(self.newest()));
             self.values.resize(self.values.len() + self.width, f64::NAN);
         }
         let from = self.values.len() - self.width;
@@ -50,6 +50,11 @@ impl Rows {
     /// True before the first.
     pub(super) fn is_empty(&self) -> bool {
         self.times.is_empty()
+    }
+
+    /// Time of the last one; the begin of all before the first.
+    pub(super) fn newest(&self) -> Instant {
+        self.times.back().copied().unwrap_or_default()
     }
 
     /// Time of a row.

@@ -60,7 +60,7 @@ struct TpdoSource {
     id: u16,
     /// Columns with the bits that they have in the frame.
     fields: Vec<(usize, std::ops::Range<u32>)>,
-    /// When it came last, or was first listened for.
+    /// When it was last taken, or first listened for.
     heard_at: Instant,
 }
 
@@ -410,7 +410,9 @@ impl Running {
                 }
                 looked_at += 1;
             }
-            if ended() || begun.is_some_and(|begun| now - begun >= span.duration + COLLECT) {
+            // A program that was held up has the last ones still to take.
+            let has_come = |end: Instant| now >= end + COLLECT && self.rows.newest() + self.period >= end;
+            if ended() || begun.is_some_and(|begun| has_come(begun + span.duration)) {
                 break None;
             }
             if let Some(failure) = self.fallen_silent() {
@@ -418,7 +420,7 @@ impl Running {
             }
             if begun.is_none() && watch.is_some() {
                 let before = self.rows.len();
-                self.rows.forget_before(earlier(now, span.pre_trigger + COLLECT * 2));
+                self.rows.forget_before(earlier(self.rows.newest(), span.pre_trigger + COLLECT * 2));
                 looked_at -= before - self.rows.len();
             }
         };
@@ -500,7 +502,7 @@ impl Running {
             };
             let (object, by_sdo) = (quantity.object, quantity.by_sdo);
             let raw = self.drive.node().upload(object).await?.raw();
-            let (at, value) = (network.now(), by_sdo.value(raw));
+            let (at, value) = (network.heard_until(), by_sdo.value(raw));
             // What came by TPDO until then has earlier times.
             self.take_frames();
             self.rows.add(at, [(column, value)].into_iter());
@@ -517,10 +519,14 @@ impl Running {
 
     /// What came by TPDO and what the world had meanwhile, in the order of their times.
     fn take_frames(&mut self) {
+        let network = self.drive.node().network();
+        let (now, heard_until) = (network.now(), network.heard_until());
         let Self { log, taken, sources, quantities, rows, lost, truth, .. } = self;
         *lost += log.as_ref().map_or(0, |log| log.take(taken));
-        let (columns, Samples { times, values, lost: missed, .. }) =
-            truth.as_ref().map(|truth| (truth.columns.as_slice(), truth.samples.take())).unwrap_or_default();
+        let (columns, Samples { times, values, lost: missed, .. }) = truth
+            .as_ref()
+            .map(|truth| (truth.columns.as_slice(), truth.samples.take_until(heard_until)))
+            .unwrap_or_default();
         *lost += missed;
         let mut samples = times.iter().zip(values.chunks(columns.len().max(1))).peekable();
         let true_values = |rows: &mut Rows, (at, values): (&Instant, &[f64])| {
@@ -531,7 +537,7 @@ impl Running {
             while let Some(sample) = samples.next_if(|(at, _)| **at <= frame.at) {
                 true_values(rows, sample);
             }
-            source.heard_at = frame.at;
+            source.heard_at = now;
             let in_frame = source.fields.iter().filter(|(_, bits)| bits.end <= u32::from(frame.length) * 8);
             let readings = in_frame.filter_map(|(column, bits)| {
                 let mask = u64::MAX >> (u64::BITS - (bits.end - bits.start));

@@ -7,7 +7,7 @@ use can::{Frame, Instant};
 /// A frame as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoggedFrame {
-    /// When it came.
+    /// When it came: by the time stamp of its interface, where that has one, and else when the program took it.
     pub at: Instant,
     /// Its identifier, 11 bits.
     pub id: u16,
@@ -71,8 +71,9 @@ impl FrameLogs {
 
 #[cfg(test)]
 mod tests {
-    use can::CanId;
+    use can::{CanId, Station};
 
+    use super::super::Core;
     use super::*;
 
     #[test]
@@ -96,5 +97,22 @@ mod tests {
         assert_eq!(logs.take(one, &mut taken), 0);
         logs.close(one);
         assert_eq!(logs.logs.len(), 1);
+    }
+
+    /// The interface has stamped them; the program was held up for 20 ms, and its deadlines count from when it took them.
+    #[test]
+    fn frames_that_are_taken_late_have_the_time_at_which_they_came() {
+        let mut core = Core::new();
+        let log = core.frame_logs_mut().open(&[0x181], 10);
+        let [first, second, now] = [100, 101, 120].map(Instant::from_millis);
+        let frame = Frame::new(CanId::standard(0x181), &[1]);
+        core.handle_stamped(&frame, first, now);
+        assert_eq!((core.now(), core.heard_until()), (now, first));
+        core.handle_stamped(&frame, second, now);
+        let mut taken = Vec::new();
+        core.frame_logs_mut().take(log, &mut taken);
+        assert_eq!(taken.iter().map(|frame| frame.at).collect::<Vec<_>>(), [first, second]);
+        core.handle_frame(&frame, now);
+        assert_eq!(core.heard_until(), now);
     }
 }

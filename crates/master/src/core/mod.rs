@@ -91,6 +91,8 @@ pub struct Core {
     due: Instant,
     image: ProcessImage,
     frame_logs: FrameLogs,
+    /// Of the last frame: how long after it came it was handed over.
+    lateness: Duration,
     sync: SyncClock,
     supervision: Supervision,
     /// Drives to stop, for the length of a call.
@@ -138,6 +140,7 @@ impl Core {
             due: Instant::FAR_FUTURE,
             image: ProcessImage::default(),
             frame_logs: FrameLogs::default(),
+            lateness: Duration::ZERO,
             sync: SyncClock::default(),
             supervision: Supervision::default(),
             lost: Vec::new(),
@@ -252,6 +255,11 @@ impl Core {
     /// Frames that are kept one by one.
     pub const fn frame_logs_mut(&mut self) -> &mut FrameLogs {
         &mut self.frame_logs
+    }
+
+    /// The time of the bus up to which frames have been handed over: [`now`](Self::now), less how late the last one came.
+    pub fn heard_until(&self) -> Instant {
+        Instant::ZERO + (self.now - Instant::ZERO).saturating_sub(self.lateness)
     }
 
     /// The latest time that was passed to this core.
@@ -422,9 +430,14 @@ impl Core {
 
 impl Station for Core {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.handle_stamped(frame, now, now);
+    }
+
+    fn handle_stamped(&mut self, frame: &Frame, at: Instant, now: Instant) {
         self.advance(now);
+        self.lateness = now - at;
         let Some(id) = frame.standard_data_id() else { return };
-        self.frame_logs.note(id, frame, now);
+        self.frame_logs.note(id, frame, at);
         if let Some(node) = self.image.handle_frame(id, frame, now) {
             self.member_mut(node).facts.seen_at = Some(now);
             self.changed.insert(node);

@@ -201,6 +201,11 @@ impl Network {
         self.lock().core.now()
     }
 
+    /// See [`Core::heard_until`].
+    pub fn heard_until(&self) -> Instant {
+        self.lock().core.heard_until()
+    }
+
     /// Looks into the core, or changes mappings and values to send. The runner is woken to fetch frames.
     pub fn with_core<T>(&self, look: impl FnOnce(&mut Core) -> T) -> T {
         self.with_shared(|shared| look(&mut shared.core))
@@ -378,7 +383,11 @@ impl ActivityWakers {
 
 impl Station for Network {
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
-        self.run(now, |core| core.handle_frame(frame, now));
+        self.handle_stamped(frame, now, now);
+    }
+
+    fn handle_stamped(&mut self, frame: &Frame, at: Instant, now: Instant) {
+        self.run(now, |core| core.handle_stamped(frame, at, now));
     }
 
     fn handle_timeout(&mut self, now: Instant) {

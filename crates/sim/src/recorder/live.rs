@@ -183,13 +183,19 @@ impl Subscription {
 
     /// Takes what came since the last call.
     pub fn take(&self) -> Samples {
+        self.take_until(Instant::FAR_FUTURE)
+    }
+
+    /// Takes what came since the last call and is not after a time.
+    pub fn take_until(&self, last: Instant) -> Samples {
         let mut state = self.of.lock();
         let Some(feed) = state.feeds.iter_mut().find(|feed| feed.token == self.token) else {
             return Samples::default();
         };
+        let count = feed.times.partition_point(|at| *at <= last);
         Samples {
-            times: std::mem::take(&mut feed.times),
-            values: std::mem::take(&mut feed.values),
+            times: feed.times.drain(..count).collect(),
+            values: feed.values.drain(..count * self.width).collect(),
             lost: std::mem::take(&mut feed.lost),
             is_missing: feed.is_missing,
         }

@@ -62,7 +62,10 @@ where
             () = wakeup.notified() => StationEvent::Woken,
         };
         match event {
-            StationEvent::Received(frame) => station.handle_frame(&frame, clock.now()),
+            StationEvent::Received(at, frame) => {
+                let now = clock.now();
+                station.handle_stamped(&frame, at.min(now), now);
+            }
             StationEvent::Noted(at, note) => {
                 if let Some(takes_part) = note.takes_part() {
                     station.handle_bus_off(!takes_part, clock.now());
@@ -90,7 +93,7 @@ pub fn waker_of(wakeup: Arc<Notify>) -> Waker {
 }
 
 enum StationEvent {
-    Received(Frame),
+    Received(Instant, Frame),
     Noted(Instant, Note),
     /// The station has something to send that it had not when it was last drained.
     Offered(Frame),
@@ -100,7 +103,7 @@ enum StationEvent {
 impl From<(Instant, Received)> for StationEvent {
     fn from((at, received): (Instant, Received)) -> Self {
         match received {
-            Received::Frame(frame) => Self::Received(frame),
+            Received::Frame(frame) => Self::Received(at, frame),
             Received::Note(note) => Self::Noted(at, note),
         }
     }
@@ -137,4 +140,67 @@ async fn changed_behind_our_back(station: &mut impl Station, deadline: Option<In
         None => Poll::Pending,
     })
     .await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Has two frames that came while its program was held up, and one with a time to come.
+    struct Late(Vec<(Instant, Received)>);
+
+    impl AsyncBus for Late {
+        async fn send(&mut self, _: &Frame) -> Result<(), BusError> {
+            Ok(())
+        }
+
+        async fn recv(&mut self) -> Result<(Instant, Received), BusError> {
+            match self.0.pop() {
+                Some(received) => Ok(received),
+                None => std::future::pending().await,
+            }
+        }
+    }
+
+    /// Keeps when frames came, and when it got them.
+    struct Stamps(Vec<(Instant, Instant)>);
+
+    impl Station for Stamps {
+        fn handle_frame(&mut self, _: &Frame, _: Instant) {
+            panic!("it has a time stamp");
+        }
+
+        fn handle_stamped(&mut self, _: &Frame, at: Instant, now: Instant) {
+            self.0.push((at, now));
+        }
+
+        fn handle_timeout(&mut self, _: Instant) {}
+
+        fn poll_transmit(&mut self) -> Option<Frame> {
+            None
+        }
+
+        fn poll_timeout(&self) -> Option<Instant> {
+            None
+        }
+    }
+
+    #[tokio::test]
+    async fn a_frame_comes_with_the_time_stamp_of_its_bus_and_never_later_than_now() {
+        let clock = WallClock::start();
+        let frame: Frame = "181#01".parse().expect("a frame");
+        let [one, two] = [1, 2].map(Instant::from_nanos);
+        let mut bus = Late([Instant::FAR_FUTURE, two, one].map(|at| (at, frame.into())).to_vec());
+        let (mut stamps, wakeup) = (Stamps(Vec::new()), Notify::new());
+        // What has come goes before this: it is not ready when it is first asked.
+        let until = std::pin::pin!(async {
+            for _ in 0..10 {
+                tokio::task::yield_now().await;
+            }
+        });
+        run_station(&mut bus, &mut stamps, &clock, &wakeup, until, |_, _| {}).await.expect("the bus is there");
+        let [(first, _), (second, _), (third, now)] = stamps.0[..] else { panic!("{:?}", stamps.0) };
+        assert_eq!((first, second, third), (one, two, now));
+        assert!(now >= two && now < Instant::FAR_FUTURE);
+    }
 }
