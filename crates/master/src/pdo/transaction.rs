@@ -179,10 +179,32 @@ async fn validate(node: &Node, config: &PdoConfig, cob_id: CobId) -> Result<(), 
 
 async fn restore(node: &Node, config: &PdoConfig, before: &Before) -> Result<(), WriteTrouble> {
     invalidate(node, config, before.cob_id).await?;
-    for write in &before.writes {
-        put(node, *write).await?;
+    let (mapping, parameters): (Vec<NamedWrite>, Vec<NamedWrite>) =
+        before.writes.iter().partition(|write| write.mux.index == config.mapping(0).index);
+    // What a device has refused to write is as it was, and would be refused again.
+    if differs(node, &mapping[1..]).await? {
+        for write in mapping {
+            put(node, write).await?;
+        }
+    }
+    for write in parameters {
+        if differs(node, &[write]).await? {
+            put(node, write).await?;
+        }
     }
     validate(node, config, before.cob_id).await
+}
+
+/// Whether one of these has another value.
+async fn differs(node: &Node, writes: &[NamedWrite]) -> Result<bool, WriteTrouble> {
+    for write in writes {
+        match check(node, *write).await {
+            Ok(()) => {}
+            Err(WriteTrouble::Differs(..)) => return Ok(true),
+            Err(failed) => return Err(failed),
+        }
+    }
+    Ok(false)
 }
 
 async fn put(node: &Node, write: NamedWrite) -> Result<(), WriteTrouble> {

@@ -6,10 +6,13 @@ use std::time::Duration;
 use crate::support::{mux, node};
 use can::{Bitrate, Instant};
 use canopen::Mux;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use devices::Description;
 use devices::variant::Variant;
+use master::core::PdoMap;
 use master::drive::MotionOptions;
 use master::parameters::{Left, Parameters, Plan, PlanError, PlanOptions, Purpose, Unfit, diff, roll_back, verify};
+use master::pdo::{PdoConfig, PdoError, TimerUnits};
 use master::units::Rpm;
 use master::{Drive, Network};
 use sim::machine::{Order, order};
@@ -31,6 +34,22 @@ fn bench(model: &'static Description) -> (World, Drive) {
 
 fn zlac8030l() -> (World, Drive) {
     bench(devices::model("zlac8030l").expect("a model"))
+}
+
+/// A model whose mapping is fixed refuses to clear it, when its COB-ID is invalid already; and again when all is put back.
+#[test]
+fn a_pdo_whose_mapping_is_fixed_is_as_it_was_when_another_one_was_refused() {
+    let tpdo1 = PdoId { direction: Direction::Tpdo, number: PdoNumber::FIRST };
+    for name in ["m4230e17b50", "m4230e17b80"] {
+        let (mut world, drive) = bench(devices::model(name).expect("a model"));
+        let before = backed_up(&mut world, &drive);
+        let config = PdoConfig::new(tpdo1, PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]));
+        let refused = block_on(&mut world, drive.node().configure_pdo(&config, TimerUnits::of(model_of(&drive))))
+            .expect("it goes on");
+        let refused = refused.expect_err(name);
+        assert!(matches!(refused, PdoError::Step { step: "clear the mapping", restored: true, .. }), "{refused}");
+        assert_eq!(backed_up(&mut world, &drive), before, "{name}");
+    }
 }
 
 fn backed_up(world: &mut World, drive: &Drive) -> Parameters {
