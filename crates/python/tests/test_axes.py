@@ -49,6 +49,23 @@ def test_axes_begin_and_end_together_where_they_were_sent(world, network):
     assert network.drive(1, "cia402").state()["power"] != "Operation enabled"
 
 
+@pytest.mark.parametrize("model, mode", [("cia402", 8), ("m4230e17b50", 7), ("zlac8030l", 3)])
+def test_an_axis_without_a_mode_has_the_best_of_its_model(model, mode):
+    """6060h: cyclic synchronous position, interpolated position, profile velocity (CiA 402-2, 8.4.7)."""
+    world = ferrodrive.World(bitrate=1_000_000)
+    world.add(model, node=5)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(5)
+        network.sleep(0.5)
+        before = world[5].shaft_angle_rad
+        with network.group([ferrodrive.Axis(5, model)]) as group:
+            assert network.upload(5, 0x6060) == bytes([mode])
+            at = group.state()["axes"][0]["set_point_deg"]
+            group.move([at + 20], within=2)
+            network.sleep(0.3)
+            assert math.degrees(world[5].shaft_angle_rad - before) == pytest.approx(20, abs=2)
+
+
 def test_axes_behind_gears_are_moved_by_what_the_outputs_do(world, network):
     before = [world[node].shaft_angle_rad for node in (1, 2)]
     geared = {**SERVO, "velocity_rpm": SERVO["velocity_rpm"] / 10, "acceleration_rpm_s": SERVO["acceleration_rpm_s"] / 10}

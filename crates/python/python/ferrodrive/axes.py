@@ -46,8 +46,8 @@ class Axis:
     node: int
     #: Its model, as :func:`~ferrodrive.models` lists them, or ``FILE.eds``.
     model: str
-    #: How it is moved in cycles: ``csp`` or ``ip`` by positions, ``csv`` or ``pv`` by speeds.
-    mode: str = "ip"
+    #: How it is moved in cycles: ``csp`` or ``ip`` by positions, ``csv`` or ``pv`` by speeds; None is the first of these that its model has.
+    mode: Optional[str] = None
     #: Highest speed in r/min.
     velocity_rpm: float = 30.0
     #: Highest acceleration in (r/min)/s.

@@ -29,7 +29,7 @@ pub(crate) struct AxisOrder {
     #[pyo3(item)]
     model: String,
     #[pyo3(item)]
-    mode: String,
+    mode: Option<String>,
     #[pyo3(item)]
     range_deg: Option<(f64, f64)>,
     #[pyo3(item)]
@@ -230,7 +230,11 @@ impl AxisOrder {
         };
         let drive = Drive::new(network.node(self.node)?, network.model(self.node, &self.model)?)
             .behind(network.gear(self.node, self.gear_ratio)?);
-        Ok(AxisSetup { drive, mode: mode(&self.mode).map_err(bad_value)?, limits })
+        let mode = match &self.mode {
+            Some(word) => mode(word).map_err(bad_value)?,
+            None => AxisSetup::best_mode(&drive).map_err(|error| bad_value(error.to_string()))?,
+        };
+        Ok(AxisSetup { drive, mode, limits })
     }
 }
 
