@@ -1,7 +1,7 @@
 // A sequence of commands, recorded from what a person did: as it is shown, and as the command line, Python and a scenario say it.
 // Independent of the page.
 //
-// A step is `{ after_s, command }`: the time since the step before, and what was sent.
+// A step is `{ after_s, command }`: the time since the step before, and what was sent, which is about one node, or about those of its axes.
 
 import { SHAPES } from "./test_motion.js";
 
@@ -13,6 +13,11 @@ const objectOf = (object) => object.replace("h:", ":");
 /** A file of parameters (docs: `ferrodrive params`) with these values as they were typed. */
 const valuesFile = (values) => ["[values]", ...values.map(({ object, value }) => `"${objectOf(object)}" = ${JSON.stringify(value)}`)];
 const ms = (value) => `${figure(value)}ms`;
+/** The nodes that a command is about. */
+export const nodesOf = (command) => (isOfGroup(command) ? command.axes.map(({ node }) => node) : [command.node]);
+const isOfGroup = (command) => command.do === "group_move";
+/** `1=90deg 2=-45deg` */
+const targets = (axes) => axes.map(({ node, degrees }) => `${node}=${figure(degrees)}deg`).join(" ");
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
 /** The options of a test motion: of its fields those that its shape has, and its limits where they are given. */
@@ -66,9 +71,29 @@ function testMotionArguments({ motion, quantities, capture_ms }) {
 /** Where a form has no word for a command, it has a line for people. */
 const LEFT_OUT = (what) => `# left out: ${what}`;
 
+/** Of what a PDO is to have, which the page sends as far as it changes: `TPDO1 = 6041:00,6064:00, event_ms 10`. */
+const shownPdo = ({ pdo, valid, objects, ...rest }) => `${pdo} ${[...(valid ? [] : ["off"]), ...(objects ? [objects.map(({ object }) => objectOf(object)).join()] : []), ...Object.entries(rest).map(([name, value]) => `${name} ${value}`)].join(", ") || "on"}`;
+
+/** The command line names the objects of a PDO with all else. */
+function pdoCommand(node, one) {
+  const { pdo, valid, objects, id } = one;
+  if (!valid) return `ferrodrive pdo apply ${node} ${pdo.toLowerCase()}=off`;
+  if (!objects) return LEFT_OUT(`node ${node}: ${shownPdo(one)}`);
+  const option = (name, value, form) => (value === undefined ? "" : ` --${name} ${form(value)}`);
+  return `ferrodrive pdo apply ${node} ${pdo.toLowerCase()}=${objects.map(({ object }) => objectOf(object)).join()}${option("type", one.transmission, figure)}${option("inhibit", one.inhibit_ms, ms)}${option("event", one.event_ms, ms)}${option("id", id, (value) => `0x${value.toString(16)}`)}`;
+}
+
+/** A scenario has a mapping and a transmission type for it. */
+function pdoLine(node, one) {
+  const { pdo, valid, objects, transmission, ...rest } = one;
+  if (!valid || !objects || Object.keys(rest).length > 0) return LEFT_OUT(`node ${node}: ${shownPdo(one)}`);
+  return `pdo map ${pdo.slice(0, 4).toLowerCase()} ${pdo.slice(4)} ${objects.map(({ object }) => objectOf(object)).join(" ")}${transmission === undefined ? "" : ` type ${figure(transmission)}`}`;
+}
+
 /**
  * The forms of each command that is recorded; `shown` for people. `line` is of a scenario, without the node; `cli` of the command line;
- * `python` of a drive. One that begins with `#` is a line for people, and one of several lines is a list.
+ * `python` of a drive, or in lines of its own, with the models of nodes as it writes them. One that begins with `#` is a line for people,
+ * and one of several lines is a list.
  */
 const ROWS = {
   enable: { shown: () => "Enable", line: () => "enable", cli: ({ node }) => `enable ${node}`, python: () => "enable()" },
@@ -95,13 +120,25 @@ const ROWS = {
     cli: ({ node, method, rpm }) => `home ${node} --method ${figure(method)}${rpm ? ` --profile-velocity ${figure(rpm)}rpm` : ""}`,
     python: ({ method, rpm }) => `home(${figure(method)}${rpm ? `, speed_rpm=${figure(rpm)}` : ""})`,
   },
+  group_move: {
+    shown: ({ axes, relative, within_s }) => `Move together ${relative ? "by" : "to"} ${axes.map(({ degrees }) => `${figure(degrees)}°`).join(", ")}${within_s ? ` within ${figure(within_s)} s` : ""}`,
+    line: ({ axes, relative, rpm, rpm_per_s: ramp, within_s }) => `group move ${relative ? "by " : ""}${targets(axes)}${rpm ? ` at ${figure(rpm)}rpm` : ""}${ramp ? ` acceleration ${figure(ramp)}rpm/s` : ""}${within_s ? ` within ${ms(within_s * 1e3)}` : ""}`,
+    cli: ({ axes, relative, rpm, rpm_per_s: ramp, within_s }) => `group move ${targets(axes)}${relative ? " --relative" : ""}${rpm ? ` --velocity ${figure(rpm)}rpm` : ""}${ramp ? ` --acceleration ${figure(ramp)}rpm/s` : ""}${within_s ? ` --within ${ms(within_s * 1e3)}` : ""}`,
+    python: groupInPython,
+  },
+  write_pdos: {
+    shown: ({ pdos }) => `Configure ${pdos.map(shownPdo).join("; ")}`,
+    line: ({ node, pdos }) => pdos.map((one) => pdoLine(node, one)),
+    cli: ({ node, pdos }) => pdos.map((one) => pdoCommand(node, one)),
+    python: (command) => [LEFT_OUT(`node ${command.node}: ${ROWS.write_pdos.shown(command)}`)],
+  },
   nmt: { shown: ({ command }) => `NMT ${command}`, line: ({ command }) => `nmt ${command}`, cli: ({ node, command }) => `nmt ${node} ${command}`, python: ({ node, command }) => [`network.nmt(${JSON.stringify(command)}, ${node})`] },
   store: { shown: () => "Store the parameters", line: ({ node }) => LEFT_OUT(`node ${node}: store the parameters`), cli: ({ node }) => `save ${node}`, python: () => "save()" },
   write_parameters: {
     shown: ({ values }) => `Write ${values.map(({ object, value }) => `${object} = ${value}`).join(", ")}`,
     line: ({ values }) => values.map(({ object, value }) => `write ${objectOf(object)} ${value}`),
     cli: ({ node, values }) => [`cat > node${node}.toml <<'END'`, ...valuesFile(values), "END", `ferrodrive params apply ${node} node${node}.toml`],
-    python: ({ node, values }) => [`with open("node${node}.toml", "w") as file:`, `    file.write(${JSON.stringify(`${valuesFile(values).join("\n")}\n`)})`, `network.params(${node}).apply("node${node}.toml")`],
+    python: ({ node, values }, models) => [`with open("node${node}.toml", "w") as file:`, `    file.write(${JSON.stringify(`${valuesFile(values).join("\n")}\n`)})`, `network.params(${node}${namedModel(node, models)}).apply("node${node}.toml")`],
   },
   capture: {
     shown: ({ quantities, period_ms, duration_ms, trigger }) => `Capture ${quantities.join(", ")} every ${ms(period_ms)} for ${figure(duration_ms / 1e3)} s${trigger ? ` from ${trigger}` : ""}`,
@@ -117,20 +154,42 @@ const ROWS = {
   },
 };
 
+/** The model of a node as a further argument, if it is known. */
+const namedModel = (node, models) => (models.has(node) ? `, ${models.get(node)}` : "");
+
+/** A move of several drives in Python, whose group has to know their models. */
+function groupInPython(command, models) {
+  const { axes, relative, rpm, rpm_per_s: ramp, within_s } = command;
+  const unknown = axes.find(({ node }) => !models.has(node));
+  if (unknown) return [LEFT_OUT(`${ROWS.group_move.shown(command)}: the model of node ${unknown.node} is not known`)];
+  const own = axes.map(({ node }) => `ferrodrive.Axis(${node}, ${models.get(node)}${rpm ? `, velocity_rpm=${figure(rpm)}` : ""}${ramp ? `, acceleration_rpm_s=${figure(ramp)}` : ""})`);
+  const to = axes.map(({ degrees }, at) => (relative ? `at[${at}] + ${figure(degrees)}` : figure(degrees)));
+  return [
+    `with network.group([${own.join(", ")}]) as group:`,
+    ...(relative ? ['    at = [axis["set_point_deg"] for axis in group.state()["axes"]]'] : []),
+    `    group.move([${to.join(", ")}]${within_s ? `, within=${figure(within_s)}` : ""})`,
+  ];
+}
+
 /** What a command has to have so that its forms can be made of it; parameters of a file are not recorded. */
 const WHOLE = {
   nmt: ({ command }) => typeof command === "string" && /^[a-z-]+$/.test(command),
-  write_parameters: ({ values }) => Array.isArray(values) && values.length > 0 && values.every((one) => typeof one?.object === "string" && /^[0-9A-F]{4}h:[0-9A-F]{2}$/.test(one.object) && typeof one.value === "string" && !/[\n\r]/.test(one.value)),
+  write_parameters: ({ values }) => Array.isArray(values) && values.length > 0 && values.every((one) => isObject(one?.object) && typeof one.value === "string" && !/[\n\r]/.test(one.value)),
+  group_move: ({ axes }) => Array.isArray(axes) && axes.length > 1 && axes.every((axis) => Number.isInteger(axis?.node) && typeof axis.degrees === "number"),
+  write_pdos: ({ pdos }) => Array.isArray(pdos) && pdos.length > 0 && pdos.every(isPdo),
   capture: ({ quantities, trigger }) => isNames(quantities) && (trigger === null || typeof trigger === "string"),
   test_motion: ({ motion, quantities }) => isNames(quantities) && SHAPES.some(({ value }) => value === motion?.shape) && Array.isArray(motion.path),
 };
+const isObject = (object) => typeof object === "string" && /^[0-9A-F]{4}h:[0-9A-F]{2}$/.test(object);
+const isPdo = (one) => typeof one === "object" && one !== null && isWholePdo(one);
+const isWholePdo = ({ pdo, valid, objects, ...rest }) => /^[RT]PDO[0-9]+$/.test(pdo) && typeof valid === "boolean" && (objects === undefined || (Array.isArray(objects) && objects.every((entry) => isObject(entry?.object)))) && Object.entries(rest).every(([name, value]) => /^[a-z_]+$/.test(name) && typeof value === "number");
 const isNames = (names) => Array.isArray(names) && names.every((name) => typeof name === "string" && /^[\w.:]+$/.test(name));
 
 /** Whether a command is one that a sequence has. */
 export const isRecorded = (command) => Object.hasOwn(ROWS, command.do) && (!Object.hasOwn(WHOLE, command.do) || WHOLE[command.do](command));
 
 /** Commands that leave the motion of a drive as it is, a jog too. */
-const LEAVE_MOTION = ["enable", "reset_fault", "capture", "store", "nmt"];
+const LEAVE_MOTION = ["enable", "reset_fault", "capture", "store", "nmt", "write_pdos"];
 
 /**
  * What is kept of commands that are sent: `take(command)` and `end()` give lists of commands. A jog is a turn that ends with a stop,
@@ -145,18 +204,19 @@ export function recorder() {
   };
   function take(command) {
     const { do: word, node } = command;
+    const about = nodesOf(command);
     if (word === "stop_all") {
       jogs.clear();
       return [...nodes].map((node) => ({ do: "quick_stop", node }));
     }
     if (word === "jog_end") return jogs.delete(node) ? [{ do: "stop", node }] : [];
     if (word !== "jog" && !isRecorded(command)) return [];
-    nodes.add(node);
+    for (const one of about) nodes.add(one);
     if (word === "jog") {
       jogs.add(node);
       return [{ do: "velocity", node, rpm: command.rpm, rpm_per_s: null }];
     }
-    if (!LEAVE_MOTION.includes(word)) jogs.delete(node);
+    if (!LEAVE_MOTION.includes(word)) for (const one of about) jogs.delete(one);
     return [{ ...command }];
   }
   return { take, end };
@@ -169,14 +229,14 @@ const pauseOf = ({ after_s }, at) => (at > 0 && after_s >= SHORTEST_S ? rounded(
 
 /** Steps that the browser has kept; what another version or a person wrote there, and is not a step, is left out. */
 export const keptSteps = (steps) =>
-  (Array.isArray(steps) ? steps : []).filter((step) => step && typeof step.after_s === "number" && step.command && isRecorded(step.command) && Number.isInteger(step.command.node));
+  (Array.isArray(steps) ? steps : []).filter((step) => step && typeof step.after_s === "number" && step.command && isRecorded(step.command) && nodesOf(step.command).every(Number.isInteger));
 
 /** A line for people: `+1.50 s  node 4: Turn at 60 r/min`. */
-export const shownStep = ({ after_s, command }, at) => `${at > 0 ? `+${after_s.toFixed(2)} s ` : ""}node ${command.node}: ${ROWS[command.do].shown(command)}`;
+export const shownStep = ({ after_s, command }, at) => `${at > 0 ? `+${after_s.toFixed(2)} s ` : ""}${isOfGroup(command) ? "nodes" : "node"} ${nodesOf(command).join(", ")}: ${ROWS[command.do].shown(command)}`;
 
 /** The models of the nodes that steps are about, as far as they have a name: an identity may fit several. */
 function modelsOf(steps, models) {
-  const nodes = new Set(steps.map(({ command }) => command.node));
+  const nodes = new Set(steps.flatMap(({ command }) => nodesOf(command)));
   return models.filter(({ node, model }) => nodes.has(node) && /^[a-z0-9-]+$/.test(model));
 }
 
@@ -196,16 +256,16 @@ export function commandLine(steps, bus, models = []) {
 
 /** As a program in Python. */
 export function python(steps, bus, models = []) {
-  const known = new Map(modelsOf(steps, models).map(({ node, model }) => [node, `, ${JSON.stringify(model)}`]));
-  const nodes = [...new Set(steps.map(({ command }) => command.node))];
+  const known = new Map(modelsOf(steps, models).map(({ node, model }) => [node, JSON.stringify(model)]));
+  const nodes = [...new Set(steps.flatMap(({ command }) => nodesOf(command)))];
   const lines = steps.flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    const said = ROWS[step.command.do].python(step.command);
-    const own = Array.isArray(said) ? said.map((text) => text.replace(`params(${step.command.node})`, `params(${step.command.node}${known.get(step.command.node) ?? ""})`)) : [`node_${step.command.node}.${said}`];
+    const said = ROWS[step.command.do].python(step.command, known);
+    const own = Array.isArray(said) ? said : [`node_${step.command.node}.${said}`];
     return [...(pause === null ? [] : [`network.sleep(${pause})`]), ...own].map((text) => `    ${text}`);
   });
   const on = bus === "sim" ? "socketcand://127.0.0.1:29536/can0" : bus;
-  return ["import ferrodrive", "", `with ferrodrive.Network("${on}") as network:`, ...nodes.map((node) => `    network.wait_for(${node})\n    node_${node} = network.drive(${node}${known.get(node) ?? ""})`), ...lines, ""].join("\n");
+  return ["import ferrodrive", "", `with ferrodrive.Network("${on}") as network:`, ...nodes.map((node) => `    network.wait_for(${node})\n    node_${node} = network.drive(${node}${namedModel(node, known)})`), ...lines, ""].join("\n");
 }
 
 /** As a scenario for `ferrodrive run`; `models` is the model of each node, of which all that are known are in its machine. */
@@ -214,7 +274,7 @@ export function scenario(steps, models) {
   const lines = steps.flatMap((step, at) => {
     const pause = pauseOf(step, at);
     const said = [ROWS[step.command.do].line(step.command)].flat();
-    const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(`${step.command.node} ${text}`)},`));
+    const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(isOfGroup(step.command) ? text : `${step.command.node} ${text}`)},`));
     return [...(pause === null ? [] : [`    "wait ${pause}s",`]), ...own];
   });
   return ['title = "Recorded in the studio"', "", "[machine]", "drive = [", ...drives, "]", "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");

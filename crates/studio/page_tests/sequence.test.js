@@ -126,6 +126,44 @@ test("and those of Python, and a scenario what it has words for", () => {
   for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    # left out: node 4: store the parameters', '    # left out: node 4: Test motion sine, 2 runs']) assert.ok(lines.includes(`${line}\n`), line);
 });
 
+const together = [
+  { after_s: 0, command: { do: "group_move", axes: [{ node: 1, degrees: 90 }, { node: 2, degrees: -4.5 }], relative: true, rpm: 40, rpm_per_s: 120, within_s: 2.5 } },
+  { after_s: 1, command: { do: "group_move", axes: [{ node: 1, degrees: 0 }, { node: 2, degrees: 0 }], relative: false, rpm: null, rpm_per_s: null, within_s: null } },
+];
+
+test("drives that move together do so in each form, in Python with the models that a group has to know", () => {
+  assert.deepEqual(keptSteps(together), together);
+  assert.equal(shownStep(together[0], 0), "nodes 1, 2: Move together by 90°, -4.5° within 2.5 s");
+  const lines = commandLine(together, "can0");
+  for (const line of ["ferrodrive group move 1=90deg 2=-4.5deg --relative --velocity 40rpm --acceleration 120rpm/s --within 2500ms", "ferrodrive group move 1=0deg 2=0deg"]) assert.ok(lines.includes(`${line}\n`), line);
+  const models = [{ node: 1, model: "m4230e17b50" }, { node: 2, model: "m4230e17b50" }];
+  const run = scenario(together, models);
+  for (const line of ['    "group move by 1=90deg 2=-4.5deg at 40rpm acceleration 120rpm/s within 2500ms",', '    "group move 1=0deg 2=0deg",']) assert.ok(run.includes(`${line}\n`), line);
+  const text = python(together, "can0", models);
+  for (const line of [
+    '    with network.group([ferrodrive.Axis(1, "m4230e17b50", velocity_rpm=40, acceleration_rpm_s=120), ferrodrive.Axis(2, "m4230e17b50", velocity_rpm=40, acceleration_rpm_s=120)]) as group:',
+    '        at = [axis["set_point_deg"] for axis in group.state()["axes"]]',
+    "        group.move([at[0] + 90, at[1] + -4.5], within=2.5)",
+    "        group.move([0, 0])",
+  ]) assert.ok(text.includes(`${line}\n`), line);
+  assert.match(python(together, "can0"), /^    # left out: Move together by .*: the model of node 1 is not known$/m);
+  const { take } = recorder();
+  take(together[0].command);
+  assert.deepEqual(take({ do: "stop_all" }), [{ do: "quick_stop", node: 1 }, { do: "quick_stop", node: 2 }]);
+  assert.deepEqual(keptSteps([{ after_s: 1, command: { ...together[0].command, axes: [{ node: 1, degrees: 90 }] } }, { after_s: 1, command: { ...together[0].command, axes: [{ node: 1, degrees: 90 }, { node: "2; rm", degrees: 1 }] } }]), []);
+});
+
+test("PDOs have the words of the command line, and of a scenario what it has words for", () => {
+  const pdos = [{ pdo: "TPDO1", valid: true, objects: [{ object: "6041h:00", bits: 16 }, { object: "6064h:00", bits: 32 }], transmission: 1 }, { pdo: "TPDO2", valid: false }, { pdo: "RPDO3", valid: true, objects: [{ object: "60FFh:00", bits: 32 }], id: 0x404 }, { pdo: "TPDO3", valid: true, event_ms: 10 }];
+  const step = { after_s: 0, command: { do: "write_pdos", node: 4, pdos } };
+  assert.deepEqual(keptSteps([step]), [step]);
+  assert.equal(shownStep(step, 0), "node 4: Configure TPDO1 6041:00,6064:00, transmission 1; TPDO2 off; RPDO3 60FF:00, id 1028; TPDO3 event_ms 10");
+  assert.deepEqual(commandLine([step], "can0").split("\n").slice(3, -1), ["ferrodrive pdo apply 4 tpdo1=6041:00,6064:00 --type 1", "ferrodrive pdo apply 4 tpdo2=off", "ferrodrive pdo apply 4 rpdo3=60FF:00 --id 0x404", "# left out: node 4: TPDO3 event_ms 10"]);
+  const run = scenario([step], []);
+  for (const line of ['    "4 pdo map tpdo 1 6041:00 6064:00 type 1",', "    # left out: node 4: TPDO2 off", "    # left out: node 4: RPDO3 60FF:00, id 1028"]) assert.ok(run.includes(`${line}\n`), line);
+  for (const bad of [{ pdo: "TPDO1; rm", valid: true }, { pdo: "TPDO1", valid: true, objects: [{ object: "$(rm)" }] }, { pdo: "TPDO1", valid: true, event_ms: "$(rm)" }]) assert.deepEqual(keptSteps([{ after_s: 0, command: { ...step.command, pdos: [bad] } }]), []);
+});
+
 test("of a kept sequence only what its forms can be made of is taken", () => {
   assert.deepEqual(keptSteps(measured), measured);
   const [nmt, write, , capture, test_motion] = measured.map(({ command }) => command);

@@ -13,6 +13,10 @@ fn angle(node: &Value) -> f64 {
     node["drive"]["angle_degrees"].as_f64().expect("an angle")
 }
 
+fn angles(state: &Value) -> [f64; 2] {
+    BOTH.map(|at| angle(&state["nodes"][at]))
+}
+
 fn all(state: &Value, wanted: impl Fn(&Value) -> bool) -> bool {
     BOTH.iter().all(|at| state["nodes"][*at]["drive"].is_object() && wanted(&state["nodes"][*at]))
 }
@@ -30,11 +34,30 @@ async fn two_drives_move_together_turn_while_held_and_stop_together() {
     stage.says("#group-guarding", "Node 2: if the studio dies, nothing stops it").await;
     stage.click("#group-guarding button").await;
     stage.find("#group-guarding:not(:has(button))").await;
+    stage.click("#sequence summary").await;
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=true]").await;
     stage.click("#group-move").await;
     stage.says("#group-notice", "2 drives moved together in").await;
+    stage.click("#sequence-record").await;
     // How far exactly is held in virtual time: a busy machine brings set-points late, and the drives lag behind them.
     stage.studio.wait("both have moved", |state| all(state, |node| angle(node) > 45.0 && speed(node) < 2.0));
     stage.shoot("group").await;
+    // Recorded, it is a line of a scenario for these two.
+    stage.says(".sequence li", "nodes 2, 4: Move together by 90°, 90°").await;
+    stage.choose("#sequence-form", "scenario").await;
+    stage.click("#sequence-save").await;
+    let scenario = stage.saved("sequence.toml").await;
+    let ran = processes::ferrodrive(&["run", &scenario.to_string_lossy(), "--json"]);
+    assert_eq!(ran.status, Some(0), "{} {}", ran.out, ran.err);
+    let before = angles(&stage.studio.state());
+    // A state that came late ends a play before its first command.
+    let send = "const [play, status] = ['play', 'status'].map((id) => document.getElementById(`sequence-${id}`)); \
+        const sent = status.textContent.startsWith('all 1 commands'); if (!sent && !play.checked) play.click(); return sent";
+    stage.until("the move is sent", async || stage.script(send).await == true).await;
+    stage.studio.wait("both have moved on", |state| {
+        let moved = angles(state).into_iter().zip(&before).all(|(now, before)| now - before > 45.0);
+        moved && all(state, |node| speed(node) < 2.0)
+    });
     let button = stage.find("#group-forward").await;
     let down = MouseActions::new("mouse".into())
         .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
