@@ -17,7 +17,7 @@ use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 pub(crate) const SLOW_EVERY: u32 = 16;
 
 /// A bus under this counts as empty, so that its voltage does not fall towards zero for ever.
-const EMPTY_V: f64 = 1e-3;
+pub(crate) const EMPTY_V: f64 = 1e-3;
 
 /// What never changes about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,7 +141,8 @@ impl Rig {
         self.energy.source_j += model.supply.stored_energy_j(&self.supply) - before_j;
     }
 
-    /// Disconnects the source and shorts the bus: no voltage from one step to the next.
+    /// Disconnects the source and empties the bus: no voltage from one step to the next. A motor that turns charges it again, through the
+    /// diodes of its power stage, up to its own voltage.
     pub fn cut_source(&mut self, model: &RigModel) {
         self.switch_source(model, false);
         self.energy.switches_j += model.supply.stored_energy_j(&self.supply);

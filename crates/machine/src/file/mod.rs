@@ -391,7 +391,7 @@ mod tests {
         assert!(with("supply_v = 'high'").contains("'supply_v' is \"high\"; expected a voltage"));
         assert!(with("supply_v = nan").contains("expected a voltage"));
         assert_eq!(with("supply = { voltage_v = 36, limit_a = 10, resistance_ohm = 0.2 }"), "");
-        assert!(with("supply = { limit_a = 0 }").contains("0.01 to 1000 A"));
+        assert!(with("supply = { limit_a = -1 }").contains("0 to 1000 A"));
         assert_eq!(refusal("realism = 'full'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4"), "");
         assert!(refusal("realism = 'much'\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4").contains("ideal"));
         assert!(with("supply = { voltage_v = 101 }").contains("0 to 100 V"));

@@ -22,9 +22,9 @@ use crate::{Component, PulseTrain, Refused, Report, Source, TemperatureSensor};
 /// Temperature of the surroundings.
 pub(crate) const AMBIENT_C: f64 = 25.0;
 
-/// From what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
+/// From a source that is open (0 A), over what a bench supply can be turned down to, to what a traction battery gives into a short circuit.
 const SUPPLY_LIMIT: QuantityRange =
-    QuantityRange { what: "limit of the supply", expected: "0.01 to 1000 A", least: 0.01, greatest: 1000.0 };
+    QuantityRange { what: "limit of the supply", expected: "0 to 1000 A", least: 0.0, greatest: 1000.0 };
 
 /// From a few centimetres of thick wire to what hardly lets a drive start.
 const SUPPLY_RESISTANCE: QuantityRange =
