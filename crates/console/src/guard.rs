@@ -45,7 +45,7 @@ pub struct Guard {
 /// The same for programs.
 #[derive(Debug, Serialize)]
 pub struct GuardReport {
-    /// This command has seen to it that the drive stops by itself.
+    /// This command has seen to it that the drive stops by itself: while it runs, and after it if it leaves the motor turning.
     armed: bool,
     /// After how long without this command it stops; `null` if it does not.
     stops_after_ms: Option<u64>,
@@ -103,12 +103,15 @@ impl Guard {
         if !held {
             drive.release_guard().await?;
         }
-        let note = (goes_on && context.holding == Holding::Unheld).then(|| self.farewell(drive));
+        let left = goes_on && context.holding == Holding::Unheld;
+        let note = left.then(|| self.farewell(drive));
+        // Of one that is left moving, what it has now that this command's own watch over it has ended.
+        let loss = if left { drive.host_loss().await? } else { self.loss };
         let report = GuardReport {
-            armed: self.armed,
-            stops_after_ms: self.loss.stops_after().map(|time| time.as_millis() as u64),
-            object: self.loss.object().map(|object| object.to_string()),
-            text: format!("without this command {}", self.loss),
+            armed: self.armed && loss.stops_after().is_some(),
+            stops_after_ms: loss.stops_after().map(|time| time.as_millis() as u64),
+            object: loss.object().map(|object| object.to_string()),
+            text: format!("without this command {loss}"),
         };
         Ok((report, note))
     }

@@ -42,7 +42,7 @@ fn what_nothing_would_stop_is_said_before_it_moves() {
 
 #[test]
 fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
-    let bench = VirtualBus::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4"]);
+    let bench = VirtualBus::of(&["m4230e17b50@1", "zlim42c@2", "zlac8030l@4", "cia402@5"]);
     let json = |(_, model): (&str, &str), words: &[&str]| bench.json(&[&["--model", model], words].concat());
     // By its way, since the rotor of a stepper swings about its speed: at 60 r/min several hundred counts in this time.
     let turns = |node: u8| {
@@ -52,7 +52,8 @@ fn a_command_that_leaves_a_motor_turning_says_what_happens_then() {
     };
     for (drive, armed, after_ms, object, then) in [
         (SERVO, true, json!(1000), json!("2000h:00"), "it stops by itself 1000 ms after"),
-        (JOINT, true, json!(2000), json!("1016h:01"), "it keeps moving until it is stopped"),
+        (JOINT, false, Value::Null, json!("1016h:01"), "it keeps moving until it is stopped"),
+        (("5", "5=cia402"), false, Value::Null, json!("1016h:01"), "it keeps moving until it is stopped"),
         (STEPPER, false, Value::Null, Value::Null, "it keeps moving until it is stopped"),
     ] {
         let (node, _) = drive;
