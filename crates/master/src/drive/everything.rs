@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use canopen::{AbortCode, Mux, NmtCommand, NodeId};
+use can::Instant;
+use canopen::heartbeat::Consumer;
+use canopen::{AbortCode, Mux, NmtCommand, NmtState, NodeId};
 use cia402::PowerState;
 use cia402::object::{CONTROLWORD, STATUSWORD};
 use devices::{AxisId, Description, PowerStyle};
 
+use super::guard::HEARTBEAT_CONSUMERS;
 use super::handle::Drive;
 use super::safety::{ANSWER, SILENCE, STOP};
 use crate::core::NodeSet;
@@ -19,6 +22,9 @@ use crate::network::{Network, Node, join_all};
 /// How many nodes are asked at once, and how long after them the next ones: 32 requests take 40 ms at 100 kbit/s.
 pub(super) const WINDOW: usize = 32;
 pub(super) const WINDOW_TIME: Duration = Duration::from_millis(40);
+
+/// How long the heartbeat of a program is waited for: three quarters of the two seconds within which most drives expect it.
+const HOST_HEARTBEAT: Duration = Duration::from_millis(1500);
 
 /// How far apart the axes of a device have their objects, and how many there may be (CiA 402-1: eight blocks of 800h).
 const AXIS_OFFSET: u16 = 0x800;
@@ -68,10 +74,41 @@ impl Network {
     /// can then be asked or seen. The nodes are left so: who goes on starts them again. Outputs of other devices stay
     /// as they are in pre-operational.
     ///
-    /// Then it goes on as [`quick_stop_everything`](Self::quick_stop_everything).
+    /// Then it goes on as [`quick_stop_everything`](Self::quick_stop_everything). A program whose heartbeat drives watch is no drive that
+    /// does not answer: one is told by its heartbeat, for which this waits a second and a half at most.
     pub async fn stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
         self.nmt_all(NmtCommand::EnterPreOperational);
-        self.quick_stop_everything(models).await
+        let began = self.now();
+        let mut stopped = self.quick_stop_everything(models).await;
+        let is_silent = |axis: &&StoppedAxis| axis.outcome.is_err() && self.facts(axis.node).answered_at.is_none();
+        let silent = stopped.iter().filter(is_silent).map(|axis| axis.node);
+        let silent: NodeSet = silent.filter(|node| !models.contains_key(node)).collect();
+        let drives: NodeSet = stopped.iter().map(|axis| axis.node).filter(|node| !silent.contains(*node)).collect();
+        let hosts = self.hosts_of(drives, silent, began).await;
+        stopped.retain(|axis| !hosts.contains(axis.node));
+        stopped
+    }
+
+    /// Which of these nodes that answer nothing are programs: their heartbeat is what drives watch (1016h), and it goes on to say
+    /// "operational" behind the command of `began`, which a device obeys and a master does not.
+    async fn hosts_of(&self, drives: NodeSet, silent: NodeSet, began: Instant) -> NodeSet {
+        if silent.is_empty() {
+            return NodeSet::EMPTY;
+        }
+        let watched = drives.iter().map(|id| async move {
+            let consumers = self.node(id).with_timeout(ANSWER).by_server_in_use();
+            consumers.read::<u32>(Mux::new(HEARTBEAT_CONSUMERS, 1)).await.ok().and_then(Consumer::from_raw)
+        });
+        let watched = join_all(watched.collect::<Vec<_>>()).await.into_iter().flatten();
+        let watched: NodeSet = watched.map(|consumer| consumer.node()).filter(|node| silent.contains(*node)).collect();
+        let is_host = |node: NodeId| {
+            let facts = self.facts(node);
+            facts.heartbeat_at.is_some_and(|at| at > began) && facts.nmt_state == Some(NmtState::Operational)
+        };
+        while self.now() - began < HOST_HEARTBEAT && !watched.iter().all(is_host) {
+            self.sleep(ANSWER / 4).await;
+        }
+        watched.iter().filter(|node| is_host(*node)).collect()
     }
 
     /// The same, and the NMT state of each node stays as it is: for callers that may only stop drives. A drive that

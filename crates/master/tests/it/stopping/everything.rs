@@ -7,13 +7,13 @@ use std::future::poll_fn;
 use std::pin::pin;
 use std::time::Duration;
 
-use can::{CanId, Frame};
+use can::{CanId, Frame, Instant, Station};
 use canopen::NmtCommand;
 use cia402::{Controlword, PowerCommand};
 use devices::model;
 use master::Network;
 use master::base::Twist;
-use master::drive::{MotionOptions, StopWay, StoppedAxis};
+use master::drive::{HostLoss, MotionOptions, StopWay, StoppedAxis, SwitchedOff};
 use master::units::Rpm;
 use sim::wire::WireEvent;
 use sim::{Place, Stimulus, block_on};
@@ -208,6 +208,65 @@ fn a_drive_whose_answers_come_late_is_seen_to_stand_all_the_same() {
             assert!(axis.outcome.is_ok(), "{name}: {stopped:?}");
         }
         assert_eq!(stopped.len(), NODES.len(), "{name}");
+    }
+}
+
+const BEATING: u8 = 9;
+
+/// Sends the heartbeat of a device in pre-operational each 100 ms, and answers nothing.
+#[derive(Clone)]
+struct Beating {
+    due: Instant,
+    sent: bool,
+}
+
+impl Station for Beating {
+    fn handle_frame(&mut self, _: &Frame, _: Instant) {}
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if now >= self.due {
+            (self.due, self.sent) = (now + Duration::from_millis(100), false);
+        }
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        let beat = Frame::new(CanId::standard(0x700 + u16::from(BEATING)), &[0x7F]);
+        (!std::mem::replace(&mut self.sent, true)).then_some(beat)
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        Some(self.due)
+    }
+}
+
+/// It beats as node 127 and answers nothing. A device that drives watch and that answers nothing is not taken for one: it obeys NMT.
+#[test]
+fn the_program_that_a_drive_watches_is_no_drive_that_does_not_answer() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let other = bench.other();
+        let [first, _] = bench.drives.clone();
+        let loss = bench.run(first.guard(SwitchedOff::Leave)).unwrap();
+        bench.turn();
+        bench.world.run_for(Duration::from_secs(2));
+        let host = node(127);
+        let beats = matches!(loss, HostLoss::StopsWithoutHeartbeat { .. });
+        assert_eq!(other.seen().contains(host), beats, "{name}");
+        let stopped = bench.stop_everything_by(&other);
+        assert_eq!(stopped.iter().map(|axis| axis.node).collect::<Vec<_>>(), NODES.map(node), "{name}: {stopped:?}");
+        assert!(stopped.iter().all(|axis| axis.outcome.is_ok()), "{name}: {stopped:?}");
+        if !beats {
+            continue;
+        }
+        bench.run(first.release_guard()).unwrap();
+        bench.world.add_station(Beating { due: bench.world.now(), sent: true });
+        // For a second.
+        bench.run(first.node().write(mux(0x1016, 1), u32::from(BEATING) << 16 | 1000)).unwrap();
+        let other = bench.other();
+        bench.world.run_for(Duration::from_secs(1));
+        let stopped = bench.stop_everything_by(&other);
+        let silent = stopped.iter().find(|axis| axis.node == node(BEATING)).expect("it was heard");
+        assert!(silent.outcome.is_err() && stopped.len() == NODES.len() + 1, "{name}: {stopped:?}");
     }
 }
 
