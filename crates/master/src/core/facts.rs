@@ -16,11 +16,13 @@ const EMCY_KEPT: usize = 8;
 pub struct NodeFacts {
     /// State of its last boot-up or heartbeat message.
     pub nmt_state: Option<NmtState>,
+    /// That of the last one that did not say "stopped", which is an alarm of some models.
+    pub(super) nmt_state_before: Option<NmtState>,
     /// When its last boot-up message came, and how many have come.
     pub boot_up: Option<(Instant, u32)>,
     /// When its last heartbeat or boot-up message came.
     pub heartbeat_at: Option<Instant>,
-    /// The last NMT command that this master sent it, and when; forgotten at its boot-up.
+    /// The last NMT command that it was sent, by this master or by another that was heard, and when; forgotten at its boot-up.
     pub nmt_sent: Option<(Instant, NmtCommand)>,
     /// When any frame of its predefined connection set came (CiA 301, 7.3.3).
     pub seen_at: Option<Instant>,
@@ -103,6 +105,9 @@ impl NodeFacts {
     pub(super) fn note_heartbeat(&mut self, state: NmtState, now: Instant) -> bool {
         self.heartbeat_at = Some(now);
         let booted = state == NmtState::Initialising;
+        if state != NmtState::Stopped {
+            self.nmt_state_before = Some(state);
+        }
         if booted {
             self.boot_up = Some((now, self.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
             self.nmt_sent = None;
@@ -114,18 +119,20 @@ impl NodeFacts {
         !booted && core::mem::take(&mut watch.lost)
     }
 
-    /// The state that it must be in: by the last NMT command of this master, or by what it has sent since, as a node of
-    /// this model means it (as the standard says, if the model is not known).
+    /// The state that it must be in: by the last NMT command, or by what it has sent since, as a node of
+    /// this model means it (as the standard says, if the model is not known); `None` where neither shows it.
     pub fn probable_state(&self, description: Option<&Description>) -> Option<NmtState> {
         let commanded = self.nmt_sent.and_then(|(at, command)| Some((at, state_after(command)?)));
-        let said = self.nmt_state.map(|said| match description {
-            // Such a model's heartbeat cannot show that it is stopped: the last command decides.
+        let said = self.nmt_state.and_then(|said| match description {
+            // Such a heartbeat shows an alarm in place of the state, which is then that of the last command, or of before the alarm. A program
+            // that has heard neither does not know it.
             Some(description) if description.tells_alarm(said) => {
-                commanded.map_or(NmtState::Operational, |(_, state)| state)
+                let before = self.nmt_state_before.map(|said| description.nmt_state(said));
+                commanded.map(|(_, state)| state).or(before)
             }
-            Some(description) => description.nmt_state(said),
-            None if said == NmtState::Initialising => NmtState::PreOperational,
-            None => said,
+            Some(description) => Some(description.nmt_state(said)),
+            None if said == NmtState::Initialising => Some(NmtState::PreOperational),
+            None => Some(said),
         });
         let since = commanded.filter(|(at, _)| self.heartbeat_at.is_none_or(|heard| heard < *at));
         since.map(|(_, state)| state).or(said)

@@ -11,13 +11,19 @@ use super::facts::HeartbeatWatch;
 /// NMT commands, and the watch over the heartbeats that show their effect.
 impl Core {
     pub(super) fn send_nmt(&mut self, target: NmtTarget, command: NmtCommand) {
+        let request = NmtRequest::new(command, target);
+        self.note_nmt(request);
+        self.push_frame(request.emit());
+    }
+
+    /// A command that is sent, or that was heard of another master.
+    pub(super) fn note_nmt(&mut self, NmtRequest { command, target }: NmtRequest) {
         let now = self.now;
         for node in NodeId::all().filter(|node| target.includes(*node)) {
             let facts = &mut self.member_mut(node).facts;
             facts.nmt_sent = Some((now, command));
             facts.heartbeats.commanded();
         }
-        self.push_frame(NmtRequest::new(command, target).emit());
     }
 
     pub(super) fn watch_heartbeat(&mut self, node: NodeId, time: Option<Duration>) {

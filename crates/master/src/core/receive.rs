@@ -102,9 +102,8 @@ impl Core {
 
     /// Another master commands a state: the heartbeats that follow show it.
     pub(super) fn handle_nmt(&mut self, frame: &Frame) {
-        let Ok(NmtRequest { target, .. }) = NmtRequest::parse(frame) else { return };
-        for node in NodeId::all().filter(|node| target.includes(*node)) {
-            self.member_mut(node).facts.heartbeats.commanded();
+        if let Ok(request) = NmtRequest::parse(frame) {
+            self.note_nmt(request);
         }
     }
 

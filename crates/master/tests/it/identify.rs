@@ -206,6 +206,17 @@ fn a_joint_in_alarm_is_operational_though_its_heartbeat_says_04h() {
     let state = block_on(&mut world, drive.state()).unwrap().unwrap();
     assert_eq!(state.nmt, Some(NmtState::Operational), "{state:?}");
     assert!(state.fault_code.is_some_and(|code| code != 0));
+    // Another program that comes only now has heard nothing else; one that was there has heard what a third one commands.
+    let later = Network::new();
+    world.add_station(later.clone());
+    world.run_for(Duration::from_secs(2));
+    let seen = |network: &Network| network.facts(node(JOINT)).probable_state(drive.description());
+    assert_eq!((seen(&network), seen(&later)), (Some(NmtState::Operational), None));
+    let third = Network::new();
+    world.add_station(third.clone());
+    third.nmt_all(canopen::NmtCommand::EnterPreOperational);
+    world.run_for(Duration::from_secs(2));
+    assert_eq!(seen(&later), Some(NmtState::PreOperational));
 }
 
 /// A drive takes about a second to boot, in which it is deaf; the scan comes to it in its first half second.
