@@ -11,7 +11,7 @@ use super::kinematics::{Geometry, Pose, Twist, Wheels};
 use super::limits::{BaseError, BaseLimits};
 use super::state::StopCause;
 use crate::core::NodeSet;
-use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest, Refusal, at_rest};
+use crate::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest, Refusal, at_rest, seen_to_stand};
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::network::{Claim, Exchange, Network};
@@ -413,14 +413,16 @@ impl Base {
         let off = if matches!(stopped, Err(BaseError::NoCycle(_))) { Ok(()) } else { self.switch_off().await };
         self.network.sync(None);
         let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
-        // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
-        let (heard, unseen): (Vec<_>, Vec<_>) = self.wheels.iter().partition(|wheel| wheel.is_heard());
-        let unseen = unseen.first().map(|wheel| NotAtRest::NotSeen { node: wheel.drive.node() });
-        let coasting = self.network.stop_once(heard.iter().map(|wheel| wheel.drive.node()).collect()).await;
+        let unheard = self.wheels.iter().filter(|wheel| !wheel.is_heard());
+        let unheard: NodeSet = unheard.map(|wheel| wheel.drive.node()).collect();
+        let heard = nodes.iter().filter(|node| !unheard.contains(*node)).collect();
+        let mut asked = self.network.stop_once(heard).await;
+        // One that answers nothing is not asked again, which would take its time.
+        let answering = self.network.answering(unheard).await;
+        asked.extend(self.network.stop_once(answering).await);
         let released = self.network.release_guards(nodes).await;
         stopped.and(off)?;
-        coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
-        unseen.map_or(Ok(()), Err)?;
+        seen_to_stand::<BaseError>(asked, unheard, answering)?;
         Ok(released?)
     }
 

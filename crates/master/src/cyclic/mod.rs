@@ -19,3 +19,4 @@ pub use drive::CyclicDrive;
 pub use open::{CyclicError, CyclicOptions};
 pub use rest::NotAtRest;
 pub(crate) use rest::at_rest;
+pub(crate) use rest::seen_to_stand;

@@ -5,6 +5,9 @@ use core::time::Duration;
 use canopen::NodeId;
 
 use super::drive::CyclicDrive;
+use crate::core::NodeSet;
+use crate::drive::Stopped;
+use crate::error::Error;
 use crate::units::Shown;
 
 /// How long after its last set-point a shaft may take to show that it stands.
@@ -77,4 +80,17 @@ pub(crate) fn at_rest<'a>(
         None => NotAtRest::NotSeen { node },
     };
     (waited >= REST_LIMIT).then_some(Err(why))
+}
+
+/// Whether all were seen to stand when they were asked by SDO at the end of their cycles. A drive that is `unheard` there sends no TPDO,
+/// as one that another master has taken to pre-operational: it may well be among those that are `answering`.
+pub(crate) fn seen_to_stand<E>(stopped: Vec<Stopped>, unheard: NodeSet, answering: NodeSet) -> Result<(), E>
+where
+    E: From<Error> + From<NotAtRest>,
+{
+    if let Some(node) = unheard.iter().find(|node| !answering.contains(*node)) {
+        return Err(NotAtRest::NotSeen { node }.into());
+    }
+    stopped.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
+    Ok(())
 }

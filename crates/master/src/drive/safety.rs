@@ -6,6 +6,7 @@
 use std::time::Duration;
 
 use can::Instant;
+use canopen::object::DEVICE_TYPE;
 use canopen::{Mux, NodeId};
 use cia402::object::{CONTROLWORD, POSITION_ACTUAL_VALUE, STATUSWORD};
 use cia402::{Controlword, PowerCommand, PowerState, Statusword};
@@ -89,6 +90,17 @@ impl Network {
     /// The same without a second try, for a caller that has one to come.
     pub(crate) async fn stop_once(&self, nodes: NodeSet) -> Vec<Stopped> {
         self.stop_within(nodes, ANSWER, SILENCE).await
+    }
+
+    /// Which of these nodes answer: one that does not takes a tenth of a second, or nothing where it has left its last request unanswered.
+    pub(crate) async fn answering(&self, nodes: NodeSet) -> NodeSet {
+        let asked = nodes.iter().filter(|node| self.facts(*node).unanswered == 0).map(|id| async move {
+            let node = self.node(id).by_server_in_use();
+            // Its channel may wait for an answer to what was asked before.
+            let answered = self.within(LAST_ANSWER, node.upload(DEVICE_TYPE)).await;
+            answered.is_some_and(|answer| answer.is_ok()).then_some(id)
+        });
+        join_all(asked.collect::<Vec<_>>()).await.into_iter().flatten().collect()
     }
 
     async fn stop_within(&self, nodes: NodeSet, answer: Duration, silence: Duration) -> Vec<Stopped> {

@@ -12,7 +12,7 @@ use super::state::{GroupState, Phase, StopCause};
 use super::stream::{Stream, StreamOptions};
 use super::trajectory::Trajectory;
 use crate::core::NodeSet;
-use crate::cyclic::{CyclicState, NotAtRest, at_rest};
+use crate::cyclic::{CyclicState, NotAtRest, at_rest, seen_to_stand};
 use crate::drive::{Drive, REACHED_TURNS};
 use crate::error::Error;
 use crate::network::{Exchange, Network};
@@ -333,15 +333,16 @@ impl Group {
         let disabled = self.disable().await;
         self.network.sync(None);
         let nodes: NodeSet = self.drives.iter().map(|drive| drive.node().id()).collect();
-        // One that is not heard is not asked again, which would take its time; that it was not seen to stand is the error.
-        let axes = self.runner.axes.iter().zip(&self.runner.states);
-        let (heard, unseen): (Vec<_>, Vec<_>) = axes.partition(|(_, state)| state.statusword.is_some());
-        let unseen = unseen.first().map(|(axis, _)| NotAtRest::NotSeen { node: axis.drive.node() });
-        let coasting = self.network.stop_once(heard.iter().map(|(axis, _)| axis.drive.node()).collect()).await;
+        let unheard = self.runner.axes.iter().zip(&self.runner.states).filter(|(_, state)| state.statusword.is_none());
+        let unheard: NodeSet = unheard.map(|(axis, _)| axis.drive.node()).collect();
+        let heard = nodes.iter().filter(|node| !unheard.contains(*node)).collect();
+        let mut stopped = self.network.stop_once(heard).await;
+        // One that answers nothing is not asked again, which would take its time.
+        let answering = self.network.answering(unheard).await;
+        stopped.extend(self.network.stop_once(answering).await);
         let released = self.network.release_guards(nodes).await;
         disabled?;
-        coasting.into_iter().try_for_each(|stopped| stopped.outcome.map(drop))?;
-        unseen.map_or(Ok(()), Err)?;
+        seen_to_stand::<GroupError>(stopped, unheard, answering)?;
         Ok(released?)
     }
 

@@ -18,7 +18,7 @@ use master::units::Rpm;
 use sim::wire::WireEvent;
 use sim::{Place, Stimulus, block_on};
 
-use super::{Bench, Moving, NODES, PERIOD, models, options};
+use super::{Bench, Motion, Moving, NODES, PERIOD, models, options};
 use crate::support::{mux, node};
 
 impl Bench {
@@ -208,6 +208,25 @@ fn a_drive_whose_answers_come_late_is_seen_to_stand_all_the_same() {
             assert!(axis.outcome.is_ok(), "{name}: {stopped:?}");
         }
         assert_eq!(stopped.len(), NODES.len(), "{name}");
+    }
+}
+
+/// In pre-operational they send no TPDO, and answer SDO: they are seen to stand there, and no watch over a host is left armed.
+#[test]
+fn a_group_that_another_program_has_stopped_closes_and_gives_the_watches_back() {
+    for name in models() {
+        let mut bench = Bench::new(name);
+        let Some(moving) = bench.set_in_motion(Motion::GroupMove) else { continue };
+        let (_, moving) = bench.stop_everything(moving, name);
+        let Some(Moving::Group(group)) = moving else { panic!("{name}: it is a group") };
+        bench.run(group.close()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(NODES.iter().all(|number| bench.network.guarded(node(*number)).is_none()), "{name}");
+        assert!(bench.network.moved().is_empty(), "{name}");
+        // Longer than any of them waits for its host.
+        bench.world.run_for(Duration::from_secs(4));
+        for number in NODES {
+            assert_eq!(bench.world.report(number).unwrap().error_code, 0, "{name}");
+        }
     }
 }
 
