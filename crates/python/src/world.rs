@@ -182,7 +182,7 @@ impl WorldState {
     }
 
     pub(crate) fn keep_record(&mut self) {
-        self.recordings.keep_up(&mut self.world);
+        self.recordings.keep_up(&mut self.world, &mut self.happened);
     }
 
     fn advance_unrecorded(&mut self, until: Option<Instant>, probes: &[StationId]) -> Came {
@@ -241,7 +241,7 @@ impl World {
     fn put(&self, py: Python<'_>, number: u8, drive: Box<dyn VirtualDrive>) -> PyResult<()> {
         let state = &mut *self.shared.lock(py)?;
         state.world.add_drive(number, drive).map_err(refused)?;
-        state.recordings.follow(&mut state.world);
+        state.recordings.follow(&mut state.world, &mut state.happened);
         Ok(())
     }
 }
@@ -398,14 +398,15 @@ impl World {
         if state.recordings.has_file() {
             return Err(wrong_use("this world is being recorded already; end_record() first"));
         }
-        let begun = state.recordings.begin_file(&mut state.world, &path, Duration::from_nanos(period_ns));
+        let begun =
+            state.recordings.begin_file(&mut state.world, &mut state.happened, &path, Duration::from_nanos(period_ns));
         begun.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))
     }
 
     /// Ends the record, if there is one.
     fn end_record(&self, py: Python<'_>) -> PyResult<()> {
         let state = &mut *self.shared.lock(py)?;
-        state.recordings.end_file(&mut state.world).map_err(PyErr::from)
+        state.recordings.end_file(&mut state.world, &mut state.happened).map_err(PyErr::from)
     }
 
     /// Keeps the last `keep_ns` of what moves from now on, with a sample every `period_ns`.
@@ -417,14 +418,14 @@ impl World {
                 "more than {MOST_KEPT} samples of each signal; keep less, or sample less often"
             )));
         }
-        state.recordings.keep_trail(&mut state.world, keep, period);
+        state.recordings.keep_trail(&mut state.world, &mut state.happened, keep, period);
         Ok(())
     }
 
     /// What was kept, as SVG.
     fn trail_picture(&self, py: Python<'_>, title: &str) -> PyResult<String> {
         let state = &mut *self.shared.lock(py)?;
-        state.recordings.picture(&mut state.world, title).map_err(wrong_use)
+        state.recordings.picture(&mut state.world, &mut state.happened, title).map_err(wrong_use)
     }
 
     /// Joins an adapter to the bus; returns its number.
@@ -594,7 +595,7 @@ impl World {
         }
         (state.world, state.probes, state.machine) = (world, probes, machine);
         state.fidelity = fidelity;
-        state.recordings.follow(&mut state.world);
+        state.recordings.follow(&mut state.world, &mut state.happened);
         Ok(())
     }
 }

@@ -336,9 +336,14 @@ def test_the_marker_says_the_timing_and_the_machine(pytester):
         @pytest.mark.ferrodrive(drives="zlac8030l@4")
         def test_text(ferrodrive_world):
             pass
+
+        @pytest.mark.ferrodrive("machine.toml")
+        def test_without_a_name(ferrodrive_world):
+            pass
         """
     )
     result = pytester.runpytest()
-    result.assert_outcomes(passed=3, errors=3)
+    result.assert_outcomes(passed=3, errors=4)
+    result.stdout.fnmatch_lines(["*the marker ferrodrive has 'machine.toml' without a name; expected NAME=VALUE, of bitrate, drives*"])
     result.stdout.fnmatch_lines(["*the bit rate is in the machine file*", "*the marker ferrodrive has no drive; expected bitrate, drives*"])
     result.stdout.fnmatch_lines(["*the marker ferrodrive has drives='zlac8030l@4'; expected a list, drives=?'zlac8030l@4'?*"])

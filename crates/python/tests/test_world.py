@@ -1,5 +1,6 @@
 """A world by itself: time, drives, stimuli, snapshots, and what goes wrong."""
 
+import csv
 import os
 import pathlib
 import re
@@ -262,6 +263,25 @@ def test_a_record_has_a_row_for_each_sample(world, tmp_path):
     for name in ("run.txt", "no/such/folder.csv"):
         with pytest.raises(OSError), world.record(tmp_path / name):
             pass
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_record_has_what_happens_and_takes_it_from_nobody(world, tmp_path, asked):
+    if asked:
+        assert list(world.events()) == []
+    path = tmp_path / "run.csv"
+    world.run_for(2)
+    with world.record(path, every=0.01):
+        world.run_for(0.5)
+        world[4].set_fault("hall")
+        world.run_for(0.5)
+    with path.open(newline="") as file:
+        marks = {float(row["t_s"]): row["mark"] for row in csv.DictReader(file) if row["mark"]}
+    # Of the sample that follows it.
+    [at] = [at for at, text in marks.items() if "node 4: fault 0200h, Hall sensor" in text]
+    assert at == pytest.approx(2.505, abs=0.01)
+    if asked:
+        assert any(event["kind"] == "fault" for event in world.events())
 
 
 class Reporting(ferrodrive.VirtualDrive):

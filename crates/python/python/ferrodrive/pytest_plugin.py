@@ -105,6 +105,8 @@ def marked(request: pytest.FixtureRequest) -> dict[str, Any]:
     """What the test's marker has."""
     marker = request.node.get_closest_marker("ferrodrive")
     wanted: dict[str, Any] = {} if marker is None else marker.kwargs
+    if marker is not None and marker.args:
+        raise ValueError(f"the marker ferrodrive has {', '.join(map(repr, marker.args))} without a name; expected NAME=VALUE, of {', '.join(sorted(KNOWN))}")
     if unknown := sorted(set(wanted) - KNOWN):
         raise ValueError(f"the marker ferrodrive has no {', '.join(unknown)}; expected {', '.join(sorted(KNOWN))}")
     if isinstance(drives := wanted.get("drives", ()), str):

@@ -1,4 +1,4 @@
-//! What happened in a world: for the program that asks for it, and the last of it for a report on a test that failed.
+//! What happened in a world: for the program that asks for it, for a record, and the last of it for a report on a test that failed.
 
 use std::collections::VecDeque;
 
@@ -16,6 +16,8 @@ pub(super) struct Happened {
     waiting: Vec<Event>,
     /// The last ones, where a report may want them.
     kept: Option<VecDeque<Event>>,
+    /// What a record that is being written has not taken yet.
+    recorded: Option<Vec<Event>>,
 }
 
 impl Happened {
@@ -24,7 +26,24 @@ impl Happened {
         self.look(world);
         self.waiting.clear();
         self.asked = on;
-        world.watch(on || self.kept.is_some());
+        self.watch_as_needed(world);
+    }
+
+    /// A record takes what happens from now on, or no longer.
+    pub(super) fn record(&mut self, world: &mut sim::World, on: bool) {
+        self.look(world);
+        self.recorded = on.then(Vec::new);
+        self.watch_as_needed(world);
+    }
+
+    fn watch_as_needed(&self, world: &mut sim::World) {
+        world.watch(self.asked || self.kept.is_some() || self.recorded.is_some());
+    }
+
+    /// What happened since the last call, for the record.
+    pub(super) fn take_for_record(&mut self, world: &mut sim::World) -> Vec<Event> {
+        self.look(world);
+        self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// The last events are kept from now on.
@@ -54,6 +73,9 @@ impl Happened {
                     kept.pop_front();
                 }
                 kept.push_back(event.clone());
+            }
+            if let Some(recorded) = &mut self.recorded {
+                recorded.push(event.clone());
             }
             if self.asked {
                 self.waiting.push(event);

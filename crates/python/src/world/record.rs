@@ -8,10 +8,13 @@ use std::time::Duration;
 
 use can::Instant;
 use devices::AxisId;
-use recording::{Column, Kind, Record, Trail, picture};
+use recording::{Batch, Column, Kind, Record, Trail, picture};
 use sim::Place;
+use sim::events::Event;
 use sim::recorder::{Channel, Recorder, Signal};
 use sim::wire::WireEvent;
+
+use super::happened::Happened;
 
 /// How much virtual time may pass between two looks at what was sampled: less than fills the world's log of frames.
 const WRITE_PERIOD: Duration = Duration::from_millis(100);
@@ -51,13 +54,20 @@ impl Recordings {
     ///
     /// # Errors
     /// What the system says of the file; a name that ends in neither `.mcap` nor `.csv`.
-    pub(super) fn begin_file(&mut self, world: &mut sim::World, path: &Path, period: Duration) -> io::Result<()> {
+    pub(super) fn begin_file(
+        &mut self,
+        world: &mut sim::World,
+        happened: &mut Happened,
+        path: &Path,
+        period: Duration,
+    ) -> io::Result<()> {
         let no_kind = || io::Error::new(io::ErrorKind::InvalidInput, "a record is a file .mcap or .csv");
         let kind = Kind::of_name(&path.to_string_lossy()).ok_or_else(no_kind)?;
         let file = File::options().read(true).write(true).create(true).truncate(true).open(path)?;
-        self.look(world);
+        self.look(world, happened);
         self.sample(world, &Signal::ALL, period);
         let record = Record::begin(kind, Box::new(file), &self.columns)?;
+        happened.record(world, true);
         self.file = Some(Writing { record, frames_until: world.now(), failed: None });
         Ok(())
     }
@@ -66,11 +76,12 @@ impl Recordings {
     ///
     /// # Errors
     /// What the system said of the file at any time.
-    pub(super) fn end_file(&mut self, world: &mut sim::World) -> io::Result<()> {
-        self.look(world);
+    pub(super) fn end_file(&mut self, world: &mut sim::World, happened: &mut Happened) -> io::Result<()> {
+        self.look(world, happened);
         world.stop_recording();
+        happened.record(world, false);
         let ended = self.file.take();
-        self.follow(world);
+        self.follow(world, happened);
         match ended {
             Some(Writing { failed: Some(error), .. }) => Err(error),
             Some(writing) => writing.record.finish(),
@@ -79,38 +90,49 @@ impl Recordings {
     }
 
     /// Keeps the last of what moves from now on; what was kept before is lost.
-    pub(super) fn keep_trail(&mut self, world: &mut sim::World, keep: Duration, period: Duration) {
+    pub(super) fn keep_trail(
+        &mut self,
+        world: &mut sim::World,
+        happened: &mut Happened,
+        keep: Duration,
+        period: Duration,
+    ) {
         self.trail = Some(PeriodicTrail { trail: Trail::new(keep, period), period });
-        self.follow(world);
+        self.follow(world, happened);
     }
 
     /// What was kept, as SVG.
     ///
     /// # Errors
     /// A sentence: nothing was kept.
-    pub(super) fn picture(&mut self, world: &mut sim::World, title: &str) -> Result<String, String> {
-        self.look(world);
+    pub(super) fn picture(
+        &mut self,
+        world: &mut sim::World,
+        happened: &mut Happened,
+        title: &str,
+    ) -> Result<String, String> {
+        self.look(world, happened);
         let following = self.trail.as_ref().ok_or("nothing of this world was kept; keep_trail() before it moves")?;
         let poster = picture(title, &following.trail.recorded(), &[], 0.0..=f64::INFINITY)?;
         Ok(poster.to_svg())
     }
 
     /// The world has other drives now, or was another: its recorder is put in order.
-    pub(super) fn follow(&mut self, world: &mut sim::World) {
+    pub(super) fn follow(&mut self, world: &mut sim::World, happened: &mut Happened) {
         if self.file.is_some() {
             return;
         }
         if let Some(PeriodicTrail { period, .. }) = self.trail {
-            self.look(world);
+            self.look(world, happened);
             let signals: Vec<Signal> = Trail::signals().collect();
             self.sample(world, &signals, period);
         }
     }
 
     /// Takes what has come, if that is due.
-    pub(super) fn keep_up(&mut self, world: &mut sim::World) {
+    pub(super) fn keep_up(&mut self, world: &mut sim::World, happened: &mut Happened) {
         if world.now() >= self.next_at {
-            self.look(world);
+            self.look(world, happened);
         }
     }
 
@@ -133,32 +155,29 @@ impl Recordings {
     }
 
     /// Hands on what was sampled and carried since the last look.
-    fn look(&mut self, world: &mut sim::World) {
+    fn look(&mut self, world: &mut sim::World, happened: &mut Happened) {
         self.next_at = world.now() + WRITE_PERIOD;
         let Some(recorded) = world.take_recorded() else { return };
         if let Some(PeriodicTrail { trail, .. }) = &mut self.trail {
             trail.take(&self.columns, recorded.rows());
         }
         if let Some(writing) = self.file.as_mut().filter(|writing| writing.failed.is_none()) {
-            writing.failed = writing.write(world, &recorded).err();
+            let events = happened.take_for_record(world);
+            writing.failed = writing.write(world, recorded, &events).err();
         }
     }
 }
 
 impl Writing {
-    fn write(&mut self, world: &sim::World, recorded: &Recorder) -> io::Result<()> {
-        for (at, values) in recorded.rows() {
-            self.record.row(at, values)?;
-        }
+    fn write(&mut self, world: &sim::World, recorded: Recorder, events: &[Event]) -> io::Result<()> {
         let last = self.frames_until;
-        for event in world.log().iter() {
-            if let WireEvent::Frame { end, frame, .. } = event
-                && *end > last
-            {
-                self.record.frame(*end, frame)?;
-                self.frames_until = *end;
-            }
-        }
+        let frames = world.log().iter().filter_map(|event| match event {
+            WireEvent::Frame { end, frame, .. } if *end > last => Some((*end, *frame)),
+            _ => None,
+        });
+        let frames: Vec<_> = frames.collect();
+        self.frames_until = frames.last().map_or(last, |(end, _)| *end);
+        Batch::of_world(Some(recorded), frames, events).give(|entry| self.record.put(entry))?;
         self.record.flush()
     }
 }
