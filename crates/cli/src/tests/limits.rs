@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use processes::scratch;
 use serde_json::json;
 
 use super::virtual_bus::{VirtualBus, without_bus};
@@ -40,6 +41,34 @@ fn limits_follow_what_is_written_to_the_objects_that_move_them() {
     assert!(ended.err.contains("takes -10000 to 10000 in units of r/min / 10"), "{}", ended.err);
     let ended = on_bus(&["velocity", "4", "2.7rpm", "--for", "100ms"]);
     assert!(ended.out.starts_with("node 4: turn at 2.7 r/min: reached"), "{}{}", ended.out, ended.err);
+}
+
+/// 607Fh as delivered is 83 turns a second, 6072h is 300 % of 2.8 A. The same of a servo by its data sheet, and after a change.
+#[test]
+fn what_a_servo_by_the_profile_holds_back_is_refused_before_anything_moves() {
+    let folder = scratch("servo-limits");
+    let sheet = folder.write("maker.eds", &without_bus(&["eds", "cia402"]).out);
+    for model in ["cia402", sheet.as_str()] {
+        let bench = VirtualBus::of(&[&format!("{model}@5")]).with(&["--model", &format!("5={model}")]);
+        for (words, by) in [
+            (&["velocity", "5", "6000rpm"][..], "607Fh:00"),
+            (&["torque", "5", "20A"], "6072h:00"),
+            (&["move", "5", "1turn", "--profile-velocity", "6000rpm"], "607Fh:00"),
+        ] {
+            let ended = bench.run(words);
+            assert!(
+                ended.status == Some(1) && ended.err.contains(&format!("by {by}")),
+                "{model} {words:?}: {}",
+                ended.err
+            );
+            assert!(ended.err.contains("It was not sent"), "{model} {words:?}: {}", ended.err);
+            assert!(bench.report(5).velocity_rpm.abs() < 1.0, "{model} {words:?}");
+        }
+        bench.done(&["write", "5", "6072", "100"]);
+        let ended = bench.run(&["torque", "5", "2A"]);
+        assert!(ended.err.contains("6072h:00 max_torque = 100"), "{model}: {}", ended.err);
+        bench.done(&["velocity", "5", "60rpm", "--for", "100ms"]);
+    }
 }
 
 #[test]

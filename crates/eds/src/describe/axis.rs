@@ -10,7 +10,7 @@ use devices::{AxisDescription, CountsPerTurn, HomingRules, Placement, Quantity, 
 
 /// Most axes of a device: eight blocks of 800h from 6000h on (CiA 402-1).
 const MOST_AXES: u16 = 8;
-const BLOCK: u16 = 0x800;
+pub(super) const BLOCK: u16 = 0x800;
 
 /// The axes: each block of the profile area that has a controlword and a statusword. None for a device that is not a drive by
 /// 1000h; makers often leave its value open, and then the objects decide.

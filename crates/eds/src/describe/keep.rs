@@ -1,6 +1,6 @@
 //! Descriptions of devices that files describe.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -10,10 +10,11 @@ use canopen::object::CONSUMER_HEARTBEAT_TIME_1;
 use canopen::od::{DefaultValue, Entry, FREE_PLACES, MAX_ROWS, RowFacts, Table, TableError};
 use canopen::{Mux, NodeId};
 use cia402::ErrorCode;
+use cia402::object::{MAX_PROFILE_VELOCITY, MAX_TORQUE, PROFILE_VELOCITY, TARGET_TORQUE, TARGET_VELOCITY};
 use devices::faults::Faults;
 use devices::{Description, HostWatch, Identity, NmtRules, ParameterStorage, PdoRules, Timing, servo};
 
-use super::axis::{axes, say_modes};
+use super::axis::{BLOCK, axes, say_modes};
 use super::names;
 use super::rows::{DraftRow, leak, rows};
 use crate::Eds;
@@ -112,6 +113,25 @@ impl fmt::Display for Unkept {
 
 impl std::error::Error for Unkept {}
 
+/// Targets whose effect another object of the axis holds back, which has their unit (CiA 402-2, max torque, max profile velocity).
+const HELD_BACK: [(Mux, Mux); 3] =
+    [(TARGET_TORQUE, MAX_TORQUE), (PROFILE_VELOCITY, MAX_PROFILE_VELOCITY), (TARGET_VELOCITY, MAX_PROFILE_VELOCITY)];
+
+/// Says of the rows of each axis by which object they are held back, where the device has that.
+fn say_limits(rows: &mut [DraftRow]) {
+    let there: HashSet<Mux> = rows.iter().map(|row| row.entry.mux()).collect();
+    for row in rows.iter_mut().filter(|row| (0x6000..0x8000).contains(&row.entry.index)) {
+        let block = (row.entry.index - 0x6000) / BLOCK * BLOCK;
+        let held =
+            HELD_BACK.iter().find(|(of, _)| (of.index + block, of.sub_index) == (row.entry.index, row.entry.sub_index));
+        if let Some((_, by)) = held
+            && there.contains(&Mux::new(by.index + block, by.sub_index))
+        {
+            row.entry = row.entry.held_to(by.index + block, by.sub_index, 1);
+        }
+    }
+}
+
 fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
     let count = eds.variables().count();
     match count {
@@ -121,6 +141,7 @@ fn describe(eds: &Eds, manual: &str) -> Result<Description, Unkept> {
     }
     let mut rows = rows(eds);
     say_modes(&mut rows);
+    say_limits(&mut rows);
     say_identity(eds, &mut rows);
     let table = table(rows)?;
     let identity = identity(eds, table);

@@ -33,7 +33,8 @@ impl Drive {
             Some(HeldTo { object, counts }) => {
                 // A drive that refuses the object holds nothing back by it.
                 let setting = refused_is_none(self.setting(object).await)?;
-                setting.map(|setting| (setting.value * counts * scale, setting))
+                // Of 0 it lets nothing move, or some devices everything: what keeps a drive from turning is another question.
+                setting.filter(|setting| setting.value != 0).map(|setting| (setting.value * counts * scale, setting))
             }
             None => {
                 let greatest = self.amount(row.mux(), VL_VELOCITY_MAX_AMOUNT).await?;

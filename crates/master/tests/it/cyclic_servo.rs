@@ -164,7 +164,7 @@ fn a_step_beyond_607fh_is_refused() {
     let to = |turns: f64| Demand::Position(Angle::Turns(from + turns));
     let state = bench.run(&mut cyclic, 10, |_| to(0.01));
     let Some(Refusal::StepTooLarge { bound, .. }) = state.refused else { panic!("{state}") };
-    assert_eq!(bound.object, mux(0x607F, 0));
+    assert_eq!(bound.by.map(|setting| setting.object), Some(mux(0x607F, 0)), "{bound}");
     // A hundredth of a turn at two turns a second takes 5 ms.
     let state = bench.run(&mut cyclic, 6, |cycle| to(0.01 * f64::from(cycle + 1) / 6.0));
     assert_eq!(state.refused, None, "{state}");

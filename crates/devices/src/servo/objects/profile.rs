@@ -76,7 +76,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x606E, 0, U16).described("How long it has to be as near").default(10).unit("ms").mappable().saved(),
     rw(0x606F, 0, U16).described("Velocity that counts as standstill").default(TURN / 10).unit(INC_S).mappable().saved(),
     rw(0x6070, 0, U16).described("How long it has to be as slow").default(10).unit("ms").mappable().saved(),
-    rw(0x6071, 0, I16).unit(PER_MILLE).mappable(),
+    rw(0x6071, 0, I16).unit(PER_MILLE).held_to(0x6072, 0, 1).mappable(),
     rw(0x6072, 0, U16).default(3000).unit(PER_MILLE).mappable().saved(),
     rw(0x6073, 0, U16).default(3000).unit(PER_MILLE).saved(),
     ro(0x6074, 0, I16).unit(PER_MILLE).mappable(),
@@ -96,7 +96,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     rw(0x607E, 0, U8).described("Bit 7: positions, bit 6: velocities change their sign").saved(),
     rw(0x607F, 0, U32).default(RATED_TURNS_S * 5 / 3 * TURN).unit(INC_S).mappable().saved(),
     rw(0x6080, 0, U32).default(5000).unit(RPM).mappable().saved(),
-    rw(0x6081, 0, U32).described("Velocity of position moves").default(10 * TURN).unit(INC_S).mappable().saved(),
+    rw(0x6081, 0, U32).described("Velocity of position moves").default(10 * TURN).unit(INC_S).held_to(0x607F, 0, 1).mappable().saved(),
     rw(0x6082, 0, U32).described("Velocity at the target of a position move").unit(INC_S).mappable().saved(),
     rw(0x6083, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
     rw(0x6084, 0, U32).default(200 * TURN).unit(INC_S2).mappable().saved(),
@@ -198,7 +198,7 @@ pub(super) static ROWS: [Entry; ROW_COUNT] = [
     ro(0x60FE, 0, U8).default(2),
     rw(0x60FE, 1, U32).mappable(),
     rw(0x60FE, 2, U32).described("Outputs that the host drives").saved(),
-    rw(0x60FF, 0, I32).unit(INC_S).mappable(),
+    rw(0x60FF, 0, I32).unit(INC_S).held_to(0x607F, 0, 1).mappable(),
     // Permanent magnets, sine.
     ro(0x6402, 0, U16).default(10),
     // pp, vl, pv, tq, hm, ip, csp, csv, cst, cstca.
