@@ -398,8 +398,8 @@ impl World {
         if state.recordings.has_file() {
             return Err(wrong_use("this world is being recorded already; end_record() first"));
         }
-        let begun =
-            state.recordings.begin_file(&mut state.world, &mut state.happened, &path, Duration::from_nanos(period_ns));
+        let period = Duration::from_nanos(period_ns);
+        let begun = state.recordings.begin_file(&mut state.world, &mut state.happened, &path, period);
         begun.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))
     }
 
@@ -593,8 +593,7 @@ impl World {
                  or restore it before",
             ));
         }
-        (state.world, state.probes, state.machine) = (world, probes, machine);
-        state.fidelity = fidelity;
+        (state.world, state.probes, state.machine, state.fidelity) = (world, probes, machine, fidelity);
         state.recordings.follow(&mut state.world, &mut state.happened);
         Ok(())
     }

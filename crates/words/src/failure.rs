@@ -7,7 +7,7 @@ use std::fmt;
 
 use canopen::{AbortCode, Mux, NodeId};
 use cia402::ModeOfOperation;
-use master::base::BaseError;
+use master::base::{BaseError, StopCause};
 use master::group::GroupError;
 use serde::Serialize;
 
@@ -263,6 +263,10 @@ impl From<BaseError> for Failure {
             }
             BaseError::NotEnabled { .. } => base().next("ferrodrive explain NODE says what keeps each of them"),
             BaseError::NotAtRest(why) => base().at_node(why.node()).next(SEE_DRIVES),
+            BaseError::Stopped(StopCause::Wheel { node, .. } | StopCause::Lag { node, .. })
+            | BaseError::NotStopped { cause: StopCause::Wheel { node, .. } | StopCause::Lag { node, .. }, .. } => {
+                base().at_node(node).next(SEE_DRIVES)
+            }
             _ => base().next(SEE_DRIVES),
         }
     }

@@ -355,7 +355,7 @@ async fn drive_base(drives: Vec<Drive>, asked: BaseJog, wanted: Rc<Cell<Wanted>>
     let mut base = base.map_err(refused)?;
     let driven = follow_twists(&mut base, &wanted).await;
     let reason = match &driven {
-        Err(BaseError::Stopped(_)) => base.explain_stop().await,
+        Err(BaseError::Stopped(_) | BaseError::NotStopped { .. }) => base.explain_stop().await,
         _ => None,
     };
     let pose = base.state().pose;

@@ -294,10 +294,11 @@ fn drive(text: &mut String, node: &InitNode) {
         };
     }
     text.push_str(
-        "# What stands behind its shaft: turns of the shaft for one of the output, and the way for one turn of the output.\n\
+        "# What stands behind its shaft: turns of the shaft for one of the output (of a joint motor the last number of its model's name),\n\
+         # and the way for one turn of the output.\n\
          #units = { gear_ratio = 50, feed_constant = \"10mm\" }\n\
-         # What hangs on the shaft of a simulated one.\n\
-         #load = { torque_nm = 0.5, inertia_kg_m2 = 0.01 }\n",
+         # What hangs on the shaft of a simulated one. A torque_nm beside it would pull all the time, as a weight does.\n\
+         #load = { inertia_kg_m2 = 0.01, friction = { coulomb_nm = 0.05, viscous_nm_s = 0.001 } }\n",
     );
     let _ = match node.description.map(|model| (model, limits(model, node.node))) {
         Some((_, Some(limits))) => writeln!(text, "# Limits that `boot` sets.\n#limits = {{ {limits} }}"),

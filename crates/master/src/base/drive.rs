@@ -340,7 +340,8 @@ impl Base {
     /// What became of [`start_stop`](Self::start_stop): `None` while the wheels come to rest, `Ok` once both were seen to stand.
     ///
     /// # Errors
-    /// [`BaseError::NotAtRest`] for a wheel that does not come to rest; [`BaseError::Stopped`] where a wheel was lost before or on the
+    /// [`BaseError::NotAtRest`] for a wheel that does not come to rest, or [`BaseError::NotStopped`] where the base had been stopped
+    /// before; [`BaseError::Stopped`] where a wheel was lost before or on the
     /// way to rest, once those that are heard stand.
     pub fn stopped(&self) -> Option<Result<(), BaseError>> {
         if !self.is_stopping || self.still_cycles == 0 {
@@ -352,7 +353,7 @@ impl Base {
         let wheels = self.wheels.iter().filter(|wheel| lost.is_none() || wheel.is_heard());
         let rest = at_rest(wheels.map(|wheel| &wheel.drive), waited)?;
         Some(match (rest, lost) {
-            (Err(why), _) => Err(why.into()),
+            (Err(why), _) => Err(self.state.cause.map_or(why.into(), |cause| BaseError::NotStopped { cause, why })),
             (Ok(()), Some(cause)) => Err(BaseError::Stopped(cause)),
             (Ok(()), None) => Ok(()),
         })

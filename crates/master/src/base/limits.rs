@@ -135,6 +135,14 @@ pub enum BaseError {
     /// The base was stopped.
     #[error("{0}")]
     Stopped(StopCause),
+    /// The base was stopped, and a wheel was not seen to come to rest behind that.
+    #[error("{cause}. After that {why}")]
+    NotStopped {
+        /// Why it was stopped.
+        cause: StopCause,
+        /// What became of it.
+        why: NotAtRest,
+    },
     /// The wheels were not enabled in time.
     #[error(
         "the wheels were not enabled within {} s: {left}; {right}. Look at the faults, the supply and the enable input of the wheel that \

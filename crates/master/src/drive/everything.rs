@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::heartbeat::Consumer;
+use canopen::object::CONSUMER_HEARTBEAT_TIME_1;
 use canopen::{AbortCode, Mux, NmtCommand, NmtState, NodeId};
 use cia402::PowerState;
 use cia402::object::{CONTROLWORD, STATUSWORD};
 use devices::{AxisId, Description, PowerStyle};
 
-use super::guard::HEARTBEAT_CONSUMERS;
 use super::handle::Drive;
 use super::safety::{ANSWER, SILENCE, STOP};
 use crate::core::NodeSet;
@@ -74,8 +74,8 @@ impl Network {
     /// can then be asked or seen. The nodes are left so: who goes on starts them again. Outputs of other devices stay
     /// as they are in pre-operational.
     ///
-    /// Then it goes on as [`quick_stop_everything`](Self::quick_stop_everything). A program whose heartbeat drives watch is no drive that
-    /// does not answer: one is told by its heartbeat, for which this waits a second and a half at most.
+    /// Then it goes on as [`quick_stop_everything`](Self::quick_stop_everything). A program whose heartbeat drives watch is left out,
+    /// though it was heard and does not answer: it is known by that heartbeat, for which this waits a second and a half at most.
     pub async fn stop_everything(&self, models: &BTreeMap<NodeId, &'static Description>) -> Vec<StoppedAxis> {
         self.nmt_all(NmtCommand::EnterPreOperational);
         let began = self.now();
@@ -97,7 +97,7 @@ impl Network {
         }
         let watched = drives.iter().map(|id| async move {
             let consumers = self.node(id).with_timeout(ANSWER).by_server_in_use();
-            consumers.read::<u32>(Mux::new(HEARTBEAT_CONSUMERS, 1)).await.ok().and_then(Consumer::from_raw)
+            consumers.read::<u32>(CONSUMER_HEARTBEAT_TIME_1).await.ok().and_then(Consumer::from_raw)
         });
         let watched = join_all(watched.collect::<Vec<_>>()).await.into_iter().flatten();
         let watched: NodeSet = watched.map(|consumer| consumer.node()).filter(|node| silent.contains(*node)).collect();

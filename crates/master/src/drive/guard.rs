@@ -27,7 +27,7 @@ const SIGNS_IN_TIME: u32 = 4;
 const SHORTEST_PERIOD: Duration = Duration::from_millis(1);
 
 /// Consumer heartbeat time (CiA 301, 7.5.2.19): bits 16 to 23 node-ID, bits 0 to 15 time in ms.
-pub(super) const HEARTBEAT_CONSUMERS: u16 = 0x1016;
+const HEARTBEAT_CONSUMERS: u16 = 0x1016;
 
 /// What a watch gets that is off as delivered: node 127, which masters mostly take, within 2000 ms, as the M joint has it.
 const OWN_WATCH: i64 = 127 << 16 | 2000;

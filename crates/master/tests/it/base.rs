@@ -266,6 +266,24 @@ fn a_blocked_wheel_stops_both_before_the_base_has_turned_about_it() {
     assert!(matches!(base.command(Twist::default()), Err(BaseError::Stopped(_))), "until it is enabled anew");
 }
 
+/// Its other wheel is pulled by more than its motor holds: that it still turns is not all that is said.
+#[test]
+fn a_base_that_was_stopped_and_does_not_come_to_rest_names_both_reasons() {
+    let mut bench = Bench::new();
+    let mut base = bench.open();
+    bench.drive(&mut base, 0.4, 0.0, 2.0);
+    bench.world.apply(Place::node(RIGHT), &Stimulus::RotorLock(true)).unwrap().unwrap();
+    while base.state().cause.is_none() {
+        base.command(Twist { linear_m_s: 0.4, angular_rad_s: 0.0 }).unwrap();
+        bench.cycle(&mut base);
+    }
+    bench.world.apply(Place::node(LEFT), &Stimulus::LoadTorque(-60.0)).unwrap().unwrap();
+    let stopped = block_on(&mut bench.world, base.stop()).unwrap().unwrap_err();
+    let BaseError::NotStopped { cause: StopCause::Lag { node, .. }, why } = &stopped else { panic!("{stopped:?}") };
+    assert_eq!((node.raw(), why.node().raw()), (RIGHT, LEFT), "{stopped}");
+    assert!(stopped.to_string().contains("lags") && stopped.to_string().contains("still turns at"), "{stopped}");
+}
+
 #[test]
 fn a_wheel_that_is_lost_while_the_base_stops_is_reported() {
     let mut bench = Bench::new();
@@ -355,7 +373,8 @@ fn a_wheel_that_its_load_drives_was_not_brought_to_rest() {
     bench.drive(&mut base, 0.2, 0.0, 0.5);
     bench.world.apply(Place::node(RIGHT), &Stimulus::LoadTorque(4.5)).unwrap().unwrap();
     let stopped = block_on(&mut bench.world, base.stop()).unwrap();
-    let Err(BaseError::NotAtRest(why)) = &stopped else { panic!("{stopped:?}") };
+    // On the way to rest it runs ahead of its command, which stops the base for good.
+    let Err(BaseError::NotStopped { cause: StopCause::Lag { .. }, why }) = &stopped else { panic!("{stopped:?}") };
     let NotAtRest::StillTurns { node: turning, rpm, .. } = why else { panic!("{why:?}") };
     assert_eq!(*turning, node(RIGHT));
     let true_rpm = bench.world.report(RIGHT).unwrap().velocity_rpm;

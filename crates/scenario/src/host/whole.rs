@@ -67,7 +67,7 @@ impl HostTask {
         }
         .await;
         let reason = match &driven {
-            Err(BaseError::Stopped(_)) => base.explain_stop().await,
+            Err(BaseError::Stopped(_) | BaseError::NotStopped { .. }) => base.explain_stop().await,
             _ => None,
         };
         let pose = base.state().pose;

@@ -178,8 +178,8 @@ fn a_joint_that_takes_pulses_goes_back_to_where_it_was_at_power_off_and_holds() 
     // "Characteristic": "reenergize automatically back to the power off position".
     let pushed_away = |bench: &mut Bench| {
         turn_to(bench, 2 * TURN + 5000);
-        bench.world("1 power cut").world("1 load torque -20").run_ms(2000);
-        bench.world("1 load torque 0").run_ms(500);
+        bench.world("1 power cut").world("1 load torque -20").run_ms(200);
+        bench.world("1 load torque 0").run_ms(3000);
         bench.world("1 power on").run_ms(10);
         assert!(bench.position() > 3 * TURN, "{}", bench.position());
     };

@@ -207,7 +207,10 @@ impl DriveBase {
         match self.follow(context, base, bounds).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
-                let cause = if let BaseError::Stopped(cause) = error { Some(cause) } else { None };
+                let cause = match error {
+                    BaseError::Stopped(cause) | BaseError::NotStopped { cause, .. } => Some(cause),
+                    _ => None,
+                };
                 let reason = if cause.is_some() { base.explain_stop().await } else { None };
                 let failure = reason.into_iter().fold(Failure::from(error), Failure::because);
                 Err(match cause {

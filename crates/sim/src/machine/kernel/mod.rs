@@ -426,7 +426,7 @@ impl<A: Assembly> VirtualDrive for Machine<A> {
             error_code: u32::from(own.fault_code),
             position: i64::from(own.position_counts),
             velocity_rpm: direction * shaft.velocity_rad_s * cia402::RPM_PER_RAD_S,
-            // What it has measured last is no current of a drive that is off.
+            // A drive that is off measures nothing: it has the last value still.
             current_a: if self.life == Life::Running { f64::from(own.current_a) } else { 0.0 },
             supply_v: rig.supply.bus_v,
             motor_c: Some(rig.winding.temperature_c),
