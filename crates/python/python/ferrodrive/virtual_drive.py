@@ -253,7 +253,7 @@ class VirtualDrive:
         self._do("power", "cycle")
 
     def power_cut(self) -> None:
-        """The drive is dead at once, in the middle of whatever it does (``power cut``).
+        """The drive is dead at once, in the middle of whatever it does (``power cut``). A motor that turns coasts.
 
         >>> world[5].power_cut()
         >>> world[5].statusword is None
@@ -393,7 +393,8 @@ class VirtualDrive:
         resistance_ohm: Optional[Number] = None,
     ) -> None:
         """The supply (``supply 48 limit 10 resistance 0.2``): open-circuit voltage in V, the most that it gives in A, resistance
-        of source and wires in ohm. None leaves that as it is.
+        of source and wires in ohm. None leaves that as it is. A source that is turned down takes the bus with it at once; with a limit
+        of 0 A it is open, and the bus lives on its capacitors: a dip or an interruption of some milliseconds.
 
         >>> world[5].set_supply(36, limit_a=10)
         """
