@@ -216,7 +216,7 @@ mod tests {
     fn what_was_stored_is_loaded() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path();
-        let eeproms = Eeproms::open(&path).unwrap();
+        let eeproms = Eeproms::open(path).unwrap();
         assert_eq!(eeproms.load("zlac8030l@4", "zlac8030l").unwrap(), None);
         eeproms.store("zlac8030l@4", "zlac8030l", b"one").unwrap();
         eeproms.store("zlac8030l@4", "zlac8030l", b"two").unwrap();
@@ -241,16 +241,16 @@ mod tests {
     fn two_simulators_cannot_share_a_directory_whatever_is_removed_from_it() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path();
-        let first = Eeproms::open(&path).unwrap();
+        let first = Eeproms::open(path).unwrap();
         first.store("a@1", "a", b"one").unwrap();
-        assert!(matches!(Eeproms::open(&path), Err(EepromError::InUse(_))));
-        for entry in fs::read_dir(&path).unwrap() {
+        assert!(matches!(Eeproms::open(path), Err(EepromError::InUse(_))));
+        for entry in fs::read_dir(path).unwrap() {
             fs::remove_file(entry.unwrap().path()).unwrap();
         }
-        assert!(matches!(Eeproms::open(&path), Err(EepromError::InUse(_))));
+        assert!(matches!(Eeproms::open(path), Err(EepromError::InUse(_))));
         // With the directory itself gone a second one is free to begin, and the first writes there no more.
-        fs::remove_dir(&path).unwrap();
-        let second = Eeproms::open(&path).unwrap();
+        fs::remove_dir(path).unwrap();
+        let second = Eeproms::open(path).unwrap();
         assert!(matches!(first.store("a@1", "a", b"two"), Err(EepromError::Replaced(_))));
         assert_eq!(second.load("a@1", "a").unwrap(), None);
     }
@@ -284,7 +284,7 @@ mod tests {
     fn what_a_kill_has_left_of_a_new_file_is_in_nobodys_way() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path();
-        let eeproms = Eeproms::open(&path).unwrap();
+        let eeproms = Eeproms::open(path).unwrap();
         let whole = wrap(b"image", "a");
         for length in [0, 5, MAGIC.len(), whole.len() - 1, whole.len()] {
             fs::write(path.join("a@1.new"), &whole[..length]).unwrap();
@@ -296,7 +296,7 @@ mod tests {
     fn a_file_that_is_far_too_long_is_not_read() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path();
-        let eeproms = Eeproms::open(&path).unwrap();
+        let eeproms = Eeproms::open(path).unwrap();
         // 3 GB that take no room.
         File::create(path.join("a@1.eeprom")).and_then(|file| file.set_len(3 << 30)).unwrap();
         let refused = eeproms.load("a@1", "a").unwrap_err().to_string();
@@ -307,7 +307,7 @@ mod tests {
     fn a_directory_that_cannot_be_written_keeps_the_old_image() {
         let scratch = tempfile::tempdir().unwrap();
         let path = scratch.path();
-        let eeproms = Eeproms::open(&path).unwrap();
+        let eeproms = Eeproms::open(path).unwrap();
         eeproms.store("a@1", "a", b"old").unwrap();
         // A directory in the place of the new file makes writing fail as a full disk does.
         fs::create_dir(path.join("a@1.new")).unwrap();

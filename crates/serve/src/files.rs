@@ -158,7 +158,7 @@ mod tests {
             create_log(&letter, Format::Candump).unwrap_err().to_string().contains("not a log of the format candump")
         );
         assert_eq!(fs::read(&letter).unwrap(), b"Dear reader");
-        assert!(create_log(&place, Format::Candump).unwrap_err().to_string().contains("directory"));
+        assert!(create_log(place, Format::Candump).unwrap_err().to_string().contains("directory"));
     }
 
     #[test]

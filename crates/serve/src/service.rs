@@ -307,7 +307,7 @@ mod tests {
     fn written(kind: Kind, keep_before: usize) -> [Vec<u8>; 2] {
         let scratch = tempfile::tempdir().unwrap();
         let folder = scratch.path();
-        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::create_dir_all(folder).unwrap();
         let (path, log) = (folder.join("record"), folder.join("log"));
         let mut world = World::new(Bitrate::K500, 1);
         world.add_drive(4, Box::new(zlac8030l(4, 1))).unwrap();
@@ -351,8 +351,7 @@ mod tests {
             }
         }
         assert!(service.part(&mut served).torn.is_empty());
-        let bytes = [path, log].map(|path| std::fs::read(path).unwrap());
-        bytes
+        [path, log].map(|path| std::fs::read(path).unwrap())
     }
 
     #[test]

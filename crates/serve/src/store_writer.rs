@@ -153,7 +153,7 @@ mod tests {
     fn what_is_settled_is_on_the_disk() {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path();
-        let eeproms = Eeproms::open(&place).unwrap();
+        let eeproms = Eeproms::open(place).unwrap();
         let (wake, woken) = channel();
         let store_writer =
             StoreWriter::start(eeproms, Messages::of_warnings(), move || wake.send(()).expect("the test waits"));
@@ -171,7 +171,7 @@ mod tests {
     fn the_last_image_handed_over_is_on_the_disk_at_the_end() {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path();
-        let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), || {});
+        let store_writer = StoreWriter::start(Eeproms::open(place).unwrap(), Messages::of_warnings(), || {});
         (1..=100).for_each(|generation| store_writer.hand_over(image(generation)));
         assert!(matches!(store_writer.finish(SOON), Some(Ok(()))));
         assert!(std::fs::read(place.join("a@1.eeprom")).unwrap().ends_with(&[100; 8]));
@@ -182,7 +182,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let place = scratch.path();
         let (wake, woken) = channel();
-        let store_writer = StoreWriter::start(Eeproms::open(&place).unwrap(), Messages::of_warnings(), move || {
+        let store_writer = StoreWriter::start(Eeproms::open(place).unwrap(), Messages::of_warnings(), move || {
             wake.send(()).expect("the test waits")
         });
         std::fs::create_dir(place.join("a@1.new")).unwrap();

@@ -248,6 +248,16 @@ impl From<GroupError> for Failure {
     }
 }
 
+impl Failure {
+    /// About the wheel that stopped a base, if one did.
+    fn of_cause(self, cause: StopCause) -> Self {
+        match cause {
+            StopCause::Wheel { node, .. } | StopCause::Lag { node, .. } => self.at_node(node),
+            StopCause::Watchdog { .. } => self,
+        }
+    }
+}
+
 impl From<BaseError> for Failure {
     /// What a drive said is that drive's failure.
     fn from(error: BaseError) -> Self {
@@ -263,10 +273,8 @@ impl From<BaseError> for Failure {
             }
             BaseError::NotEnabled { .. } => base().next("ferrodrive explain NODE says what keeps each of them"),
             BaseError::NotAtRest(why) => base().at_node(why.node()).next(SEE_DRIVES),
-            BaseError::Stopped(StopCause::Wheel { node, .. } | StopCause::Lag { node, .. })
-            | BaseError::NotStopped { cause: StopCause::Wheel { node, .. } | StopCause::Lag { node, .. }, .. } => {
-                base().at_node(node).next(SEE_DRIVES)
-            }
+            BaseError::Stopped(cause) => base().of_cause(cause).next(SEE_DRIVES),
+            BaseError::NotStopped { cause, .. } => base().of_cause(*cause).next(SEE_DRIVES),
             _ => base().next(SEE_DRIVES),
         }
     }

@@ -6,6 +6,7 @@ use canopen::od::DefaultValue;
 use canopen::{Mux, NodeId};
 use cia402::object::{MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MAX_PROFILE_VELOCITY};
 use devices::{Quantity, Scale};
+use master::group::AxisSetup;
 use master::units::Shown;
 
 use super::finding::{Place, Reporter, Severity};
@@ -19,12 +20,14 @@ pub(super) fn limits(
     at: &[Place],
     report: &mut Reporter<'_>,
 ) {
-    report.rule = "group-limits";
     let all =
         || machine.groups.iter().zip(at).flat_map(|(group, at)| group.axes.iter().map(move |axis| (group, axis, *at)));
     for (place, (group, axis, at)) in all().enumerate() {
         report.node = Some(axis.node);
         let Some(node) = nodes.get(&axis.node) else { continue };
+        report.rule = "group-mode";
+        other_mode(node, (group, axis), at, report);
+        report.rule = "group-limits";
         too_fast(machine, node, (group, axis), at, report);
         alone(node, (group, axis), at, report);
         // Said once, at the later one.
@@ -40,6 +43,22 @@ pub(super) fn limits(
         }
     }
     report.node = None;
+}
+
+/// A mode that the model does not have is refused when the group is opened.
+fn other_mode(node: &IntendedNode, (group, axis): (&GroupPlan, &AxisPlan), at: Place, report: &mut Reporter<'_>) {
+    let Some((mode, of)) = axis.mode.zip(node.description.first_axis()) else { return };
+    if of.modes.contains(&mode) {
+        return;
+    }
+    let what = format!(
+        "the group '{}' moves it in the mode {mode}, which a {} does not have: the group is refused",
+        group.name, node.description.name
+    );
+    let has =
+        of.modes.iter().filter(|mode| AxisSetup::MODES.contains(mode)).map(ToString::to_string).collect::<Vec<_>>();
+    let next = format!("leave its `mode` out, which takes the best that it has, or name one of: {}", has.join(", "));
+    report.say(Severity::Error, at, what, next);
 }
 
 /// A speed beyond what the drive does is refused when the group is opened.

@@ -507,11 +507,21 @@ fn what_a_group_states_and_its_drives_do_not_do_or_do_not_know_is_said() {
              node = 4\n{axis}acceleration_deg_s2 = 600\njerk_deg_s3 = 6000\nfollowing_error_deg = 20\n{more}"
         )
     };
-    let found = |text: &str| -> Vec<Finding> {
+    let by_rule = |text: &str, rule: &str| -> Vec<Finding> {
         let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
-        all.into_iter().filter(|finding| finding.rule == "group-limits").collect()
+        all.into_iter().filter(|finding| finding.rule == rule).collect()
     };
+    let found = |text: &str| by_rule(text, "group-limits");
     assert_eq!(found(&text("", "", "velocity_deg_s = 6000\n", "")), []);
+    // Its modes are those for profiles: position, velocity, torque.
+    for (mode, missing) in [("csp", true), ("pv", false)] {
+        let said = by_rule(&text("", "", &format!("mode = \"{mode}\"\nvelocity_deg_s = 60\n"), ""), "group-mode");
+        assert_eq!(said.len(), usize::from(missing), "{said:?}");
+        assert!(
+            said.iter().all(|said| said.severity == Severity::Error && said.next.contains("profile velocity")),
+            "{said:?}"
+        );
+    }
     // 6001 deg/s are 1000.17 r/min; behind a gear of 10 the output does a tenth.
     for (units, speed, most) in
         [("", "6001", "6000 deg/s (1000 r/min)"), ("units = { gear_ratio = 10 }\n", "601", "600 deg/s (100 r/min)")]

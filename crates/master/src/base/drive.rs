@@ -353,7 +353,10 @@ impl Base {
         let wheels = self.wheels.iter().filter(|wheel| lost.is_none() || wheel.is_heard());
         let rest = at_rest(wheels.map(|wheel| &wheel.drive), waited)?;
         Some(match (rest, lost) {
-            (Err(why), _) => Err(self.state.cause.map_or(why.into(), |cause| BaseError::NotStopped { cause, why })),
+            (Err(why), _) => {
+                let both = |cause| BaseError::NotStopped { cause: Box::new(cause), why };
+                Err(self.state.cause.map_or(why.into(), both))
+            }
             (Ok(()), Some(cause)) => Err(BaseError::Stopped(cause)),
             (Ok(()), None) => Ok(()),
         })

@@ -139,7 +139,7 @@ pub enum BaseError {
     #[error("{cause}. After that {why}")]
     NotStopped {
         /// Why it was stopped.
-        cause: StopCause,
+        cause: Box<StopCause>,
         /// What became of it.
         why: NotAtRest,
     },

@@ -67,23 +67,23 @@ impl Group {
     }
 }
 
-/// Modes in which an axis takes a set-point each cycle, the best first: positions, then speeds with the position loop in the
-/// master.
-const MODES: [ModeOfOperation; 4] = [
-    ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
-    ModeOfOperation::INTERPOLATED_POSITION,
-    ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
-    ModeOfOperation::PROFILE_VELOCITY,
-];
-
 impl AxisSetup {
+    /// Modes in which an axis takes a set-point each cycle, the best first: positions, then speeds with the position loop in the
+    /// master.
+    pub const MODES: [ModeOfOperation; 4] = [
+        ModeOfOperation::CYCLIC_SYNCHRONOUS_POSITION,
+        ModeOfOperation::INTERPOLATED_POSITION,
+        ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY,
+        ModeOfOperation::PROFILE_VELOCITY,
+    ];
+
     /// The best mode of a drive for an axis of a group: the first that it has of csp, ip, csv and pv.
     ///
     /// # Errors
     /// [`GroupError::NoMode`].
     pub fn best_mode(drive: &Drive) -> Result<ModeOfOperation, GroupError> {
         let modes = drive.axis_description().map(|axis| axis.modes);
-        let best = MODES.into_iter().find(|mode| modes.is_some_and(|modes| modes.contains(mode)));
+        let best = Self::MODES.into_iter().find(|mode| modes.is_some_and(|modes| modes.contains(mode)));
         best.ok_or_else(|| GroupError::NoMode { node: drive.node().id() })
     }
 

@@ -279,7 +279,8 @@ fn a_base_that_was_stopped_and_does_not_come_to_rest_names_both_reasons() {
     }
     bench.world.apply(Place::node(LEFT), &Stimulus::LoadTorque(-60.0)).unwrap().unwrap();
     let stopped = block_on(&mut bench.world, base.stop()).unwrap().unwrap_err();
-    let BaseError::NotStopped { cause: StopCause::Lag { node, .. }, why } = &stopped else { panic!("{stopped:?}") };
+    let BaseError::NotStopped { cause, why } = &stopped else { panic!("{stopped:?}") };
+    let StopCause::Lag { node, .. } = **cause else { panic!("{stopped:?}") };
     assert_eq!((node.raw(), why.node().raw()), (RIGHT, LEFT), "{stopped}");
     assert!(stopped.to_string().contains("lags") && stopped.to_string().contains("still turns at"), "{stopped}");
 }
@@ -374,7 +375,8 @@ fn a_wheel_that_its_load_drives_was_not_brought_to_rest() {
     bench.world.apply(Place::node(RIGHT), &Stimulus::LoadTorque(4.5)).unwrap().unwrap();
     let stopped = block_on(&mut bench.world, base.stop()).unwrap();
     // On the way to rest it runs ahead of its command, which stops the base for good.
-    let Err(BaseError::NotStopped { cause: StopCause::Lag { .. }, why }) = &stopped else { panic!("{stopped:?}") };
+    let Err(BaseError::NotStopped { cause, why }) = &stopped else { panic!("{stopped:?}") };
+    assert!(matches!(**cause, StopCause::Lag { .. }), "{cause}");
     let NotAtRest::StillTurns { node: turning, rpm, .. } = why else { panic!("{why:?}") };
     assert_eq!(*turning, node(RIGHT));
     let true_rpm = bench.world.report(RIGHT).unwrap().velocity_rpm;

@@ -207,8 +207,9 @@ impl DriveBase {
         match self.follow(context, base, bounds).await {
             Ok(seen) => Ok(seen),
             Err(error) => {
-                let cause = match error {
-                    BaseError::Stopped(cause) | BaseError::NotStopped { cause, .. } => Some(cause),
+                let cause = match &error {
+                    BaseError::Stopped(cause) => Some(*cause),
+                    BaseError::NotStopped { cause, .. } => Some(**cause),
                     _ => None,
                 };
                 let reason = if cause.is_some() { base.explain_stop().await } else { None };

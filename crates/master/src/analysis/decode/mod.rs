@@ -193,7 +193,8 @@ impl Decoder {
     }
 
     fn decode_sdo(&mut self, node: NodeId, from: Side, frame: &Frame) -> Option<Sdo> {
-        if frame.data().is_empty() {
+        // Each has eight bytes (CiA 301, 7.2.4.3): of one that is cut off nothing is known that is not there.
+        if frame.data().len() != 8 {
             return None;
         }
         let step = self.conversations.step(node, from, frame.padded());
