@@ -61,7 +61,7 @@ fn run_once(image: &Image, checks: &str) -> Result<Option<Output>, String> {
         if !started && let Some(uptime) = reported("started") {
             let (its, ours) = (uptime.trim(), began.elapsed().as_secs_f64());
             say(format_args!("the guest has started ({its} s by its clock, {ours:.0} s by ours)"));
-            // It has begun later than we have, and says so at once.
+            // It has begun later than we have, so that its uptime is the shorter one.
             if its.parse().is_ok_and(|its: f64| its > ours + 1.0) {
                 say("its clock is too fast: booting it again");
                 return Ok(None);
