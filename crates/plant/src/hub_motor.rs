@@ -16,7 +16,7 @@ use crate::mechanics::{RotorData, RotorModel};
 use crate::motor::{self, Motor};
 use crate::physics::{Physics, load_velocity_rad_s};
 use crate::pmsm::{Dq, Phase, PmsmData, PmsmInput, PmsmModel, Terminals};
-use crate::rig::{EMPTY_V, Rig, RigModel};
+use crate::rig::{Rig, RigModel, diode_v};
 use crate::shaft::{Motion, PendingStep, Turned};
 use crate::thermal::reading_c;
 
@@ -423,8 +423,7 @@ impl Inverter {
     #[inline]
     pub(crate) fn terminals(&self, bus_v: f64) -> Terminals {
         match *self {
-            // What diodes give an empty bus is a power, and at no voltage none: it would be a short for ever, where their current charges it.
-            Inverter::Open => Terminals::Open { bus_v: bus_v.max(EMPTY_V) },
+            Inverter::Open => Terminals::Open { bus_v: diode_v(bus_v) },
             Inverter::Shorted => Terminals::Shorted,
             Inverter::Driven(duty) => Terminals::from_duties(duty, bus_v),
             Inverter::Regulated => Terminals::Regulated { bus_v },

@@ -17,7 +17,14 @@ use crate::thermal::{BodyData, BodyModel, resistance_at_ohm};
 pub(crate) const SLOW_EVERY: u32 = 16;
 
 /// A bus under this counts as empty, so that its voltage does not fall towards zero for ever.
-pub(crate) const EMPTY_V: f64 = 1e-3;
+const EMPTY_V: f64 = 1e-3;
+
+/// The voltage in V against which the diodes of an open power stage conduct. What they give a bus is a power, and at no voltage none: an
+/// empty one would be a short for ever, where their current charges it.
+#[inline]
+pub(crate) fn diode_v(bus_v: f64) -> f64 {
+    bus_v.max(EMPTY_V)
+}
 
 /// What never changes about it.
 #[derive(Debug, Clone, Copy, PartialEq)]

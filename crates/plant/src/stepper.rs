@@ -18,6 +18,7 @@
 
 use crate::angle::Axis;
 use crate::pmsm::PmsmModel;
+use crate::rig::diode_v;
 
 /// Below this current an idle bridge is taken as not conducting.
 const NO_CURRENT_A: f64 = 1e-9;
@@ -327,6 +328,7 @@ impl<'a> Solver<'a> {
     /// that the magnets give the current is left out here, which makes this case second order.
     fn phase_through_diodes(&self, current_a: &mut f64, q: f64) -> PhaseOutput {
         let StepperInput { bus_v, resistance_ohm, .. } = *self.input;
+        let bus_v = diode_v(bus_v);
         let before = *current_a;
         let swing_wb = self.swing_wb * q;
         let idle = before.abs() < NO_CURRENT_A;
