@@ -1,6 +1,6 @@
 //! 2.1: the supply of 20 to 30 V, and what is below it.
 
-use crate::virtual_zlim42c::bench::Bench;
+use crate::virtual_zlim42c::bench::{Bench, assert_within};
 
 fn supply(bench: &mut Bench, supply_v: f64) {
     bench.set_supply(supply_v).run_ms(200);
@@ -34,6 +34,22 @@ fn below_20_v_the_drive_is_off_and_it_starts_anew_when_the_voltage_comes_back() 
         assert_eq!(bench.heard_of("701#"), ["701#00"], "{supply_v} V");
         assert_eq!((bench.statusword(), bench.get(0x60FF)), (0x0270, 0), "{supply_v} V");
     }
+}
+
+/// The bus is empty then, and the diodes of the bridges charge it. At 15 V, where the drive is off too, none conducts at this speed.
+#[test]
+fn a_motor_whose_supply_is_cut_coasts_as_one_whose_bus_has_voltage() {
+    let coasts = |line: &str| {
+        let mut bench = Bench::new();
+        bench.world("1 load inertia 0.01").set(0x6083, 500).enable_in(3).set(0x60FF, 30).run_ms(1500);
+        bench.world(line).run_ms(50).report().velocity_rpm
+    };
+    let free_rpm = coasts("1 supply 15");
+    for cut in ["1 power cut", "1 supply 0"] {
+        // Some 3 V into a capacitor of a millifarad are a tenth of 49 mJ, which is a twentieth of the speed.
+        assert_within(cut, coasts(cut), 0.93 * free_rpm, 1.01 * free_rpm);
+    }
+    assert_within("r/min", free_rpm, 20.0, 33.0);
 }
 
 #[test]
