@@ -18,18 +18,20 @@ const linesOf = (panes) => panes.flatMap(({ lines, ...quantity }) => lines.map((
 /** Amplitudes are small beside the values that they are of: so many decimals more. */
 const FINER = 2;
 
-/** The lines of the readout of spectra: at each cursor the amplitude of the spectral line nearest to it. */
+/** The lines of the readout of spectra: at each cursor the amplitude of the spectral line nearest to it, or why a value has none there. */
 export function measuredSpectra({ panes, cursors }) {
   const nearest = (hertz, at) => hertz.reduce((best, one, place) => (Math.abs(one - at) < Math.abs(hertz[best] - at) ? place : best), 0);
-  const all = linesOf(panes).filter(({ spectrum }) => spectrum);
-  const read = ({ label, unit, decimals, spectrum: { hertz, amplitude } }, at) => {
+  const all = linesOf(panes);
+  const read = ({ label, unit, decimals, spectrum }, at) => {
+    if (!spectrum) return `${label} too few readings`;
+    const { hertz, amplitude } = spectrum;
     const place = nearest(hertz, at);
     if (at - hertz[place] > hertz[1] - hertz[0]) return `${label} not sampled so often`;
     return `${label} ${number(amplitude[place], decimals + FINER)} ${unit} (line at ${number(hertz[place], 2)} Hz)`;
   };
   const lines = cursors.flatMap((at, which) => {
     if (at === null) return [];
-    return [`${"AB"[which]} at ${number(at, 2)} Hz: ${all.map((one) => read(one, at)).join(", ") || "no spectrum there"}`];
+    return [`${"AB"[which]} at ${number(at, 2)} Hz: ${all.map((one) => read(one, at)).join(", ") || "no values shown"}`];
   });
   const [a, b] = cursors;
   if (a !== null && b !== null) lines.push(`B − A: ${number(b - a, 2)} Hz`);

@@ -30,7 +30,7 @@ test("a cursor in a spectrum reads the amplitude of the line nearest to it, of e
   const pane = (label, unit, ...spectra) => ({ label, unit, decimals: 1, lines: spectra.map((one, at) => ({ name: `node ${at}`, spectrum: one })) });
   const panes = [pane("Speed", "r/min", sine(0.7, 31.25)), pane("Current", "A", sine(0.2, 125), sine(0.4, 31.25)), pane("Supply", "V", null)];
   const lines = measuredSpectra({ panes, cursors: [31.3, 125.1] }).split("\n");
-  assert.equal(lines[0], "A at 31.30 Hz: Speed 0.700 r/min (line at 31.25 Hz), Current of node 0 0.000 A (line at 31.25 Hz), Current of node 1 0.400 A (line at 31.25 Hz)");
+  assert.equal(lines[0], "A at 31.30 Hz: Speed 0.700 r/min (line at 31.25 Hz), Current of node 0 0.000 A (line at 31.25 Hz), Current of node 1 0.400 A (line at 31.25 Hz), Supply too few readings");
   assert.match(lines[1], /^B at 125\.10 Hz: .*Current of node 0 0\.200 A \(line at 125\.00 Hz\)/);
   assert.equal(lines[2], "B \u2212 A: 93.80 Hz");
   assert.equal(measuredSpectra({ panes, cursors: [null, null] }), "");
