@@ -151,7 +151,8 @@ pub async fn countable(drive: &Drive, angle: Angle, axis: usize) -> Result<Turns
     if (to_turns * drive.gear().ratio()).abs() > SURELY_COUNTED_TURNS {
         let most_turns = f64::from(i32::MAX) / drive.counts_per_turn().await?;
         if to_turns.abs() > most_turns {
-            return Err(PathError::BeyondCounts { axis, to_turns, most_turns }.into());
+            let error = PathError::BeyondCounts { axis, to_turns, most_turns };
+            return Err(GroupError::Path { node: Some(drive.node().id()), error });
         }
     }
     Ok(Turns(to_turns))
@@ -309,29 +310,32 @@ impl GroupMove {
         Ok(planned)
     }
 
-    /// What an axis may do: as it is asked for, else as the file says, else as a careful person would begin.
+    /// What an axis may do: as the file says, or less where less is asked for. Without a file as it is asked for, else as a careful person
+    /// would begin.
     async fn limits(&self, drive: &Drive, said: Option<&AxisLimits>) -> Result<AxisLimits, master::Error> {
-        let velocity_turns_s = self.velocity.map(|Rpm(rpm)| rpm / 60.0);
         let following = match self.following_error {
             Some(angle) => Some(turns_of(drive, angle).await?.0),
             None => None,
         };
         let (is_said, careful) = (said.is_some(), AxisLimits::careful());
         let said = said.unwrap_or(&careful);
-        let acceleration_turns_s2 = self.acceleration.unwrap_or(said.acceleration_turns_s2);
+        // A machine's limits are its file's: a number that is meant for all axes at once raises none.
+        let of =
+            |asked: Option<f64>, said: f64| asked.map_or(said, |asked| if is_said { asked.min(said) } else { asked });
+        let acceleration_turns_s2 = of(self.acceleration, said.acceleration_turns_s2);
         // Without a stated jerk it follows the acceleration.
         let rounding_s = careful.acceleration_turns_s2 / careful.jerk_turns_s3;
         let jerk = self.rounding.map(|time| acceleration_turns_s2 / time.as_secs_f64());
         Ok(AxisLimits {
             range_turns: said.range_turns.clone(),
-            velocity_turns_s: velocity_turns_s.unwrap_or(said.velocity_turns_s),
+            velocity_turns_s: of(self.velocity.map(|Rpm(rpm)| rpm / 60.0), said.velocity_turns_s),
             acceleration_turns_s2,
-            jerk_turns_s3: jerk.unwrap_or(if is_said {
-                said.jerk_turns_s3
+            jerk_turns_s3: if is_said {
+                of(jerk, said.jerk_turns_s3)
             } else {
-                acceleration_turns_s2 / rounding_s
-            }),
-            following_error_turns: following.unwrap_or(said.following_error_turns),
+                jerk.unwrap_or(acceleration_turns_s2 / rounding_s)
+            },
+            following_error_turns: of(following, said.following_error_turns),
         })
     }
 }
@@ -421,6 +425,25 @@ mod tests {
         assert_eq!((asked.relative, asked.group.as_deref(), asked.velocity), (true, Some("arm"), Some(Rpm(60.0))));
         assert_eq!((asked.within, asked.period), (Some(Duration::from_secs(3)), Some(Duration::from_millis(2))));
         assert_eq!(asked.mode, Some(ModeOfOperation::INTERPOLATED_POSITION));
+    }
+
+    /// One number is for all axes: an axis that the file lets do less does less.
+    #[test]
+    fn what_a_move_asks_for_lowers_the_limits_of_the_file_and_raises_none() {
+        let (network, node) = (master::Network::new(), NodeId::new(1).unwrap());
+        let drive = Drive::new(network.node(node), words::models::resolve("zlac8030l").unwrap());
+        let said = AxisLimits { velocity_turns_s: 1.0, following_error_turns: 0.2, ..AxisLimits::careful() };
+        let limits = |line: &str, said: Option<&AxisLimits>| {
+            let asked: GroupMove = line.parse().unwrap();
+            sim::block_on(&mut sim::World::new(can::Bitrate::K500, 1), asked.limits(&drive, said)).unwrap().unwrap()
+        };
+        let fast = "move 1=90deg at 120rpm acceleration 6000rpm/s following-error 1turn rounding 1ms";
+        assert_eq!(limits(fast, Some(&said)), said);
+        let free = limits(fast, None);
+        assert_eq!((free.velocity_turns_s, free.acceleration_turns_s2, free.following_error_turns), (2.0, 100.0, 1.0));
+        let slow = limits("move 1=90deg at 30rpm following-error 36deg", Some(&said));
+        assert_eq!((slow.velocity_turns_s, slow.following_error_turns), (0.5, 0.1));
+        assert_eq!((slow.acceleration_turns_s2, slow.jerk_turns_s3), (said.acceleration_turns_s2, said.jerk_turns_s3));
     }
 
     #[test]

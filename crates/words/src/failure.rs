@@ -224,9 +224,15 @@ impl From<GroupError> for Failure {
             GroupError::Drive(error) => error.into(),
             GroupError::Period { .. } => Self::usage(what).next("give a period within that, e.g. 5ms"),
             GroupError::NoAxis => Self::usage(what).next("name the axes that are to move as one"),
-            GroupError::Path(_) | GroupError::BeyondDrive { .. } => Self::new(what)
-                .of_kind("out_of_limits")
-                .next("give a position, velocity, acceleration or rounding within what the axes may do"),
+            GroupError::Path { .. } | GroupError::BeyondDrive { .. } => {
+                let failure = Self::new(what)
+                    .of_kind("out_of_limits")
+                    .next("give a position, velocity, acceleration or rounding within what the axes may do");
+                match error {
+                    GroupError::Path { node: Some(node), .. } | GroupError::BeyondDrive { node, .. } => failure.at_node(node),
+                    _ => failure,
+                }
+            }
             GroupError::NoMode { node } => group().at_node(node).next(MODES),
             GroupError::NoPosition { node, .. } => group().at_node(node).next(
                 "choose another mode (the best that the model has is taken without one), or map 6064h to a TPDO that comes each cycle",

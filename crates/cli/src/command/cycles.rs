@@ -29,16 +29,22 @@ impl CycleArgs {
         CyclicOptions { guard: None, tolerance: self.tolerance }
     }
 
-    /// A failure by what a drive says, with what helps where this command was late.
+    /// A failure by what a drive says, with what helps where this command was late, or the TPDOs of the drive.
     pub(super) fn advised(self, failure: Failure, refusal: Refusal) -> Failure {
-        let Refusal::Stopped(CycleLoss::ProgramLate(_)) = refusal else { return failure };
+        let late = match refusal {
+            Refusal::Stopped(CycleLoss::ProgramLate(_)) => "other programs delayed the cycles of this one",
+            Refusal::Stopped(CycleLoss::Silent(_)) => {
+                "the drive is off, or its TPDOs were late: on the bus, in the adapter, or in this host while other programs delayed it"
+            }
+            _ => return failure,
+        };
         let more = (self.tolerance.max(1) * 5).min(MOST_TOLERANCE);
         let allow = match more > self.tolerance {
-            true => format!("--tolerance {more} to allow more of them without a set-point, "),
+            true => format!("--tolerance {more} to allow more of them that miss one, "),
             false => String::new(),
         };
         failure.next(format!(
-            "other programs delayed the cycles of this one: give {allow}--realtime (Linux) to run before other programs, or a longer \
+            "{late}: give {allow}--realtime (Linux) to run before other programs, or a longer \
              period; `ferrodrive latency` measures how late this host is"
         ))
     }
@@ -85,17 +91,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_busy_host_is_shown_which_options_help_and_a_silent_drive_is_not() {
+    fn a_busy_host_is_shown_which_options_help_also_where_the_frames_of_a_drive_are_late() {
         let advised = |tolerance, loss| {
             CycleArgs { tolerance }.advised(Failure::new("axis 1 stopped"), Refusal::Stopped(loss)).next.join("; ")
         };
         for (tolerance, more) in [(2, "--tolerance 10 "), (0, "--tolerance 5 "), (20, "--tolerance 100 ")] {
-            let next = advised(tolerance, CycleLoss::ProgramLate(6));
-            for part in [more, "--realtime", "a longer period", "`ferrodrive latency`"] {
-                assert!(next.contains(part), "{tolerance}: {part:?} in {next:?}");
+            for loss in [CycleLoss::ProgramLate(6), CycleLoss::Silent(6)] {
+                let next = advised(tolerance, loss);
+                for part in [more, "--realtime", "a longer period", "`ferrodrive latency`", "delayed"] {
+                    assert!(next.contains(part), "{tolerance}: {part:?} in {next:?}");
+                }
             }
         }
-        assert_eq!(advised(2, CycleLoss::Silent(6)), "");
         assert_eq!(advised(2, CycleLoss::NoSync(Duration::from_millis(20))), "");
     }
 

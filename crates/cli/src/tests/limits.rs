@@ -68,7 +68,37 @@ fn what_a_servo_by_the_profile_holds_back_is_refused_before_anything_moves() {
         let ended = bench.run(&["torque", "5", "2A"]);
         assert!(ended.err.contains("6072h:00 max_torque = 100"), "{model}: {}", ended.err);
         bench.done(&["velocity", "5", "60rpm", "--for", "100ms"]);
+        // 6080h is in r/min of the motor (CiA 402-2, max motor speed).
+        bench.done(&["write", "5", "6080", "100"]);
+        for words in [&["velocity", "5", "120rpm"][..], &["move", "5", "1turn", "--profile-velocity", "120rpm"]] {
+            let ended = bench.run(words);
+            assert!(ended.err.contains("by 6080h:00 max_motor_speed = 100"), "{model} {words:?}: {}", ended.err);
+        }
+        bench.done(&["velocity", "5", "99rpm", "--for", "100ms"]);
     }
+}
+
+/// 607Dh (CiA 402-2, software position limit): a move beyond it is refused, and a motor that turns into it is not held by a load.
+#[test]
+fn software_limits_are_named_before_a_move_and_where_a_motor_has_turned_into_them() {
+    let bench = VirtualBus::of(&["cia402@5"]).with(&["--model", "5=cia402"]);
+    for (object, value) in [("607D:01", "-500"), ("607D:02", "500")] {
+        bench.done(&["write", "5", object, value]);
+    }
+    for (words, by) in [
+        (&["move", "5", "1turn"][..], "it acts up to 500, by 607Dh:02 max_position_limit = 500"),
+        (&["move", "5", "-501counts"], "it acts up to -500, by 607Dh:01 min_position_limit = -500"),
+        (&["move", "5", "501counts", "--relative"], "607Dh:02"),
+    ] {
+        let ended = bench.run(words);
+        assert!(ended.status == Some(1) && ended.err.contains(by), "{words:?}: {}", ended.err);
+        assert_eq!(bench.report(5).position, 0, "{words:?}");
+    }
+    bench.done(&["move", "5", "400counts"]);
+    let ended = bench.run(&["velocity", "5", "60rpm"]);
+    assert!(ended.status == Some(1) && ended.err.contains("its end there is 500 (607Dh:02)"), "{}", ended.err);
+    assert!(!ended.err.contains("shaft is held"), "{}", ended.err);
+    bench.done(&["velocity", "5", "-10rpm", "--for", "50ms"]);
 }
 
 #[test]

@@ -92,7 +92,8 @@ impl Track {
     ) -> Result<(), Failure> {
         check_path(self.points(period, from), limits, period).map_err(|refused| {
             let time_s = self.begin_s + (refused.point as f64 * period.as_secs_f64()).min(self.duration_s);
-            let failure = Failure::from(GroupError::Path(refused.error));
+            let failure =
+                Failure::from(GroupError::of_path(refused.error, drives.iter().map(|drive| drive.node().id())));
             let what = format!("{} cannot be followed: at {} s {}", self.name, Shown(time_s), failure.what);
             Failure { what, next: Vec::new(), ..failure }
                 .next("let the path take more time or keep within the limits, or raise a limit; nothing was moved")

@@ -215,7 +215,7 @@ pub fn limits(
         jerk_turns_s3: acceleration_turns_s2 / ROUNDING_S,
         following_error_turns,
     };
-    limits.check(1).map_err(|error| Failure::from(GroupError::Path(error)))?;
+    limits.check(1).map_err(|error| Failure::from(GroupError::of_path(error, None)))?;
     Ok(limits)
 }
 

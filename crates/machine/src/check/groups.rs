@@ -89,7 +89,7 @@ fn too_fast(
 }
 
 /// The highest speed of its shaft in r/min by its objects as they will be, and the object: as a drive that is there is asked for it.
-fn highest(node: &IntendedNode) -> Option<(f64, Mux)> {
+pub(super) fn highest(node: &IntendedNode) -> Option<(f64, Mux)> {
     let model = node.description;
     let axis = model.first_axis()?;
     // 6080h is in r/min whatever the units of velocities are.
@@ -114,7 +114,7 @@ fn highest(node: &IntendedNode) -> Option<(f64, Mux)> {
 }
 
 /// What an object will have: what the file has written to it, else its value as delivered.
-fn value(node: &IntendedNode, object: Mux) -> Option<u64> {
+pub(super) fn value(node: &IntendedNode, object: Mux) -> Option<u64> {
     let row = node.description.row(object)?;
     match (node.values().get(&object), row.default) {
         (Some(written), _) => {

@@ -13,10 +13,10 @@ use master::boot::{BootPlan, Expectation};
 
 use super::finding::{Findings, Place, Reporter, Severity};
 use super::generated::Planned;
-use super::groups;
 use super::intended::{Intended, IntendedNode, MovedAt};
 use super::predict::CYCLE;
 use super::{Checked, CheckedNode};
+use super::{base, groups};
 use crate::file::{Machine, pdo_id};
 use words::document::reader::{self, Field, Parameters, Table};
 use words::document::{BadFile, Problem};
@@ -70,6 +70,8 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     radii.iter().for_each(|radius| wheel_radius(*radius, &mut report));
     intended.moved.iter().for_each(|moved| interpolation(moved, &intended.nodes, &mut report));
     groups::limits(&machine, &intended.nodes, &periods, &mut report);
+    // The place of the base is behind those of the groups.
+    periods.last().iter().for_each(|at| base::limits(&machine, &intended.nodes, **at, &mut report));
     let row = |(node, place): (&NodeId, &IntendedNode)| CheckedNode {
         name: place.name.clone(),
         node: Some(node.raw()),

@@ -4,6 +4,7 @@
 //! takes a machine file. [`Checked::predict`] then boots the bus that is meant, with virtual drives of its models in virtual time, and
 //! [`Checked::ask`] holds it against the drives of a live one.
 
+mod base;
 mod bus_yml;
 mod device;
 mod finding;

@@ -62,6 +62,14 @@ impl Joined {
         &self.name
     }
 
+    /// A base on two wheels: what it is, and its nodes, the left one first, each with the turns of the wheel for one of the drive.
+    pub(super) fn differential_drive(&self) -> Option<(&DifferentialDriveModel, [(u8, f64); 2])> {
+        let (Coupling::DifferentialDrive(model), [left, right]) = (&self.coupling, &self.shafts[..]) else {
+            return None;
+        };
+        Some((model, [left, right].map(|shaft| (shaft.place.node, shaft.turns))))
+    }
+
     /// Joins the drives, which are in the world already.
     pub(super) fn couple(&self, world: &mut World) -> Result<(), BadFile> {
         let refused = |error| BadFile::one(self.at.saying(format!("body {:?}: {error}", self.name)));

@@ -22,6 +22,7 @@ use can::Bitrate;
 use canopen::{Mux, NodeId};
 use master::identify::Identity;
 use master::parameters::{Parameters, from_any_state};
+use plant::coupled::DifferentialDriveModel;
 use sim::Fidelity;
 use sim::machine::{Realism, TimingMode};
 use sim::{VirtualDrive, World};
@@ -292,6 +293,14 @@ impl Machine {
         self.join(&mut world)?;
         self.make_real(&mut world);
         Ok(world)
+    }
+
+    /// The bases on two wheels that it simulates: name, model, and the nodes, the left one first, with turns of the wheel for one of
+    /// the drive.
+    pub(crate) fn differential_drives(&self) -> impl Iterator<Item = (&str, &DifferentialDriveModel, [(u8, f64); 2])> {
+        self.bodies
+            .iter()
+            .filter_map(|body| body.differential_drive().map(|(model, wheels)| (body.name(), model, wheels)))
     }
 
     /// The names of the machines that its drives move together.

@@ -574,3 +574,59 @@ fn wheels_of_an_unlikely_size_are_named_where_the_file_says_it() {
         }
     }
 }
+
+/// 60FFh of the ZLAC8030L: -1000 to 1000 r/min, in whole r/min by 202Fh:05 as delivered (object table of its manual). A wheel of 84 mm
+/// goes 2 pi 0.084 / 60 = 0.0088 m/s at 1 r/min.
+#[test]
+fn a_base_is_held_against_its_drives_and_against_the_body_that_they_move() {
+    let text = |wheel_m_s: &str, start_up: &str, body: &str| {
+        format!(
+            "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n{start_up}[[drive]]\nmodel = \"zlac8030l\"\nnode = 5\n{start_up}{body}[base]\n\
+             wheels = [4, 5]\nturns = [1, -1]\nwheel_base_m = 0.5\nwheel_radius_m = 0.084\nlinear_m_s = 0.5\nangular_rad_s = 1\n\
+             wheel_m_s = {wheel_m_s}\nwheel_m_s2 = 0.7\n"
+        )
+    };
+    let found = |text: &str, rule: &str| -> Vec<Finding> {
+        let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        all.into_iter().filter(|finding| finding.rule == rule).collect()
+    };
+    let fast = found(&text("9", "", ""), "base-limits");
+    assert_eq!(
+        fast.iter().map(|one| (one.severity, one.node)).collect::<Vec<_>>(),
+        [4, 5].map(|node| (Severity::Warning, Some(node)))
+    );
+    assert!(fast[0].what.contains("1000 r/min (8.796") && fast[0].next.contains("`wheel_m_s` to 8.796"), "{fast:?}");
+    assert_eq!(found(&text("8.79", "", ""), "base-limits"), []);
+
+    let finer = "start_up = { '202F:05' = 10 }\n";
+    let coarse = found(&text("0.9", "", ""), "base-steps");
+    assert_eq!(
+        coarse.iter().map(|one| (one.severity, one.node)).collect::<Vec<_>>(),
+        [4, 5].map(|node| (Severity::Note, Some(node)))
+    );
+    assert!(
+        coarse[0].what.contains("0.004398")
+            && coarse[0].what.contains("0.01759")
+            && coarse[0].next.contains("write 10 to 202Fh:05"),
+        "{coarse:?}"
+    );
+    assert_eq!(found(&text("0.9", finer, ""), "base-steps"), []);
+
+    let body = |drives: &str, radius: &str, turns: &str| {
+        format!(
+            "[[body]]\nname = \"cart\"\nkind = \"differential-drive\"\ndrives = {drives}\nturns = {turns}\nmass_kg = 30\nwheel_base_m = 0.5\n\
+             wheel_radius_m = {radius}\n"
+        )
+    };
+    let said =
+        |drives: &str, radius: &str, turns: &str| found(&text("0.9", "", &body(drives, radius, turns)), "base-body");
+    assert_eq!(said("[4, 5]", "0.084", "[1, -1]"), []);
+    for (drives, radius, turns, part) in [
+        ("[4, 5]", "0.085", "[1, -1]", "`wheel_radius_m` is 0.084 in [base] and 0.085 in the body 'cart'"),
+        ("[5, 4]", "0.084", "[-1, 1]", "the left wheel of [base] is the right one of the body 'cart'"),
+        ("[4, 5]", "0.084", "[1, 1]", "a wheel that is to go 1 m goes -1 m"),
+    ] {
+        let all = said(drives, radius, turns);
+        assert!(all.len() == 1 && all[0].severity == Severity::Warning && all[0].what.contains(part), "{all:?}");
+    }
+}

@@ -4,8 +4,11 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, HeldTo};
-use cia402::object::{VL_TARGET_VELOCITY, VL_VELOCITY_MAX_AMOUNT, VL_VELOCITY_MIN_AMOUNT};
-use devices::Scale;
+use cia402::object::{
+    MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MIN_POSITION_LIMIT, POSITION_ACTUAL_VALUE, PROFILE_VELOCITY, TARGET_POSITION,
+    TARGET_VELOCITY, VL_TARGET_VELOCITY, VL_VELOCITY_MAX_AMOUNT, VL_VELOCITY_MIN_AMOUNT,
+};
+use devices::{Quantity, Scale};
 
 use super::handle::Drive;
 use super::state::refused_is_none;
@@ -41,6 +44,10 @@ impl Drive {
                 greatest.map(|(counts, setting)| (counts as i64, setting))
             }
         };
+        let held_to = match self.motor_speed(row.mux()).await? {
+            Some(by_motor) if held_to.is_none_or(|(most, _)| by_motor.0 < most) => Some(by_motor),
+            _ => held_to,
+        };
         let least = self.amount(row.mux(), VL_VELOCITY_MIN_AMOUNT).await?;
         let raised_to = least.map(|(counts, setting)| (counts.ceil() as i64, setting));
         let (low, high) = row.limits_at(scale);
@@ -61,6 +68,57 @@ impl Drive {
         // Amounts lack the set-point factor (604Bh), which is the first of the target's.
         let factor = self.product([times[0], None]).await? / self.product([over[0], None]).await?;
         Ok(Some((setting.value as f64 / factor.abs(), setting)))
+    }
+
+    /// What holds back a speed beside the object of its own row: 6080h, which is in r/min of the motor whatever the units are
+    /// (CiA 402-2, max motor speed), in counts of this object; 0 limits nothing.
+    async fn motor_speed(&self, object: Mux) -> Result<Option<(i64, Setting)>, Error> {
+        let most = self.place(MAX_MOTOR_SPEED);
+        let Some(quantity) = self.speed_of_standard(object).filter(|_| self.row(most, "find out its limits").is_ok())
+        else {
+            return Ok(None);
+        };
+        let setting = refused_is_none(self.setting(most).await)?.filter(|setting| setting.value > 0);
+        let Some(setting) = setting else { return Ok(None) };
+        let counts = self.gear.at_output(setting.value as f64) / self.step_of(quantity).await?.abs();
+        Ok(Some((counts as i64, setting)))
+    }
+
+    /// The target or profile velocity of an axis that has them where the standard does.
+    fn speed_of_standard(&self, object: Mux) -> Option<Quantity> {
+        let units = self.axis_description()?.units;
+        let speeds = [(TARGET_VELOCITY, units.target_velocity), (PROFILE_VELOCITY, units.profile_velocity)];
+        let its = |(standard, quantity): (Mux, Option<Quantity>)| {
+            quantity.filter(|quantity| quantity.object == object && object == self.place(standard))
+        };
+        speeds.into_iter().find_map(its)
+    }
+
+    /// Refuses a position beyond the software limits (CiA 402-2, 607Dh), to which a drive does not go, before anything moves. Limits the
+    /// wrong way round are none, and a model without them has none.
+    ///
+    /// # Errors
+    /// [`Error::OutOfLimits`]; those of the SDO reads.
+    pub(super) async fn check_software_limits(&self, counts: i64, relative: bool) -> Result<(), Error> {
+        let [low, high] = [MIN_POSITION_LIMIT, MAX_POSITION_LIMIT].map(|object| self.place(object));
+        if [low, high].iter().any(|object| self.row(*object, "find out its limits").is_err()) {
+            return Ok(());
+        }
+        let (low, high) = (self.setting(low).await, self.setting(high).await);
+        let (Some(low), Some(high)) = (refused_is_none(low)?, refused_is_none(high)?) else { return Ok(()) };
+        let asked = match relative {
+            true => counts.saturating_add(self.read_number(self.place(POSITION_ACTUAL_VALUE)).await?),
+            false => counts,
+        };
+        let bound = match asked {
+            _ if low.value >= high.value => return Ok(()),
+            _ if asked < low.value => low,
+            _ if asked > high.value => high,
+            _ => return Ok(()),
+        };
+        let row = self.row(self.place(TARGET_POSITION), "find out its limits")?;
+        let limits = self.limits_of(row).await?;
+        Err(self.out_of_limits(asked, Limits { held_to: Some((bound.value, bound)), ..limits }))
     }
 
     fn scale_of_velocity_mode(&self, target: Mux) -> Option<Scale> {
@@ -93,7 +151,10 @@ impl Drive {
     /// back, or raise, is refused too.
     pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
-        if row.held_to.is_none() && self.scale_of_velocity_mode(mux).is_none() || value == 0 {
+        let is_held = row.held_to.is_some()
+            || self.speed_of_standard(mux).is_some()
+            || self.scale_of_velocity_mode(mux).is_some();
+        if !is_held || value == 0 {
             return Ok(row);
         }
         let limits = self.limits_of(row).await?;

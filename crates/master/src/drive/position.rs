@@ -49,6 +49,7 @@ impl Drive {
         let units = self.motion(INTENT)?.units;
         let profile_velocity = self.has(units.profile_velocity, "a profile velocity")?;
         let (counts, mut commanded) = (to.raw, vec![to]);
+        self.check_software_limits(counts, relative).await?;
         if let Some(Rpm(speed)) = options.speed {
             let speed = self.quantity(("profile velocity", "r/min"), profile_velocity, speed.abs()).await?;
             self.write_number(speed.object, speed.raw).await?;

@@ -83,8 +83,13 @@ pub enum GroupError {
         mode: ModeOfOperation,
     },
     /// A path or a limit is wrong.
-    #[error(transparent)]
-    Path(#[from] PathError),
+    #[error("{}{error}", node.map(|node| format!("node {node}: ")).unwrap_or_default())]
+    Path {
+        /// The node of the axis that it is about, where it is about one.
+        node: Option<NodeId>,
+        /// What is wrong.
+        error: PathError,
+    },
     /// The group was stopped.
     #[error("{0}")]
     Stopped(StopCause),
@@ -163,6 +168,12 @@ pub enum GroupError {
 }
 
 impl GroupError {
+    /// What is wrong with a path or a limit of a group whose axes are at these nodes, in its order.
+    pub fn of_path(error: PathError, nodes: impl IntoIterator<Item = NodeId>) -> Self {
+        let axis = error.axis().and_then(|axis| axis.checked_sub(1));
+        Self::Path { node: axis.and_then(|axis| nodes.into_iter().nth(axis)), error }
+    }
+
     /// What a drive said, where that is why.
     pub const fn of_drive(&self) -> Option<&Error> {
         match self {

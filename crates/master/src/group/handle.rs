@@ -141,7 +141,9 @@ impl Group {
             return Err(self.not_now());
         }
         let to: Vec<_> = to.iter().map(|Turns(turns)| *turns).collect();
-        let path = Trajectory::to_rest_at(&self.runner.points, &to, &self.runner.limits, within)?;
+        let path = Trajectory::to_rest_at(&self.runner.points, &to, &self.runner.limits, within);
+        let nodes = self.runner.axes.iter().map(|axis| axis.drive.node());
+        let path = path.map_err(|error| GroupError::of_path(error, nodes))?;
         let time = Duration::from_secs_f64(path.duration_s());
         self.runner.activity = Activity::Moving { path, time_s: 0.0 };
         Ok(time)
@@ -235,7 +237,9 @@ impl Group {
     pub fn check_path<P: AsRef<[Turns]>>(&self, points: impl IntoIterator<Item = P>) -> Result<(), GroupError> {
         let runner = &self.runner;
         let mut stream = Stream::new(&runner.points, runner.period_s, StreamOptions::default());
-        stream.check_all(points, &runner.limits).map_err(|refused| refused.error.into())
+        stream
+            .check_all(points, &runner.limits)
+            .map_err(|refused| GroupError::of_path(refused.error, runner.axes.iter().map(|axis| axis.drive.node())))
     }
 
     /// The stream, while there is one: how many points wait, for how many there is room.
@@ -250,8 +254,10 @@ impl Group {
     /// [`GroupError::Stopped`], [`GroupError::Phase`].
     pub fn push(&mut self, point: &[Turns]) -> Result<(), GroupError> {
         self.check_going()?;
+        let nodes = self.runner.axes.iter().map(|axis| axis.drive.node());
         let Activity::Streaming(stream) = &mut self.runner.activity else { return Err(self.not_now()) };
-        stream.push(point, &self.runner.limits)?.map_err(|_| GroupError::StreamFull)
+        let pushed = stream.push(point, &self.runner.limits).map_err(|error| GroupError::of_path(error, nodes))?;
+        pushed.map_err(|_| GroupError::StreamFull)
     }
 
     /// Says that no further points come. The group comes to rest after the last one, within its limits.

@@ -145,6 +145,21 @@ pub enum PathError {
     NoPath(String),
 }
 
+impl PathError {
+    /// The axis that it is about, from 1, where it is about one.
+    pub const fn axis(&self) -> Option<usize> {
+        match self {
+            Self::NoNumber { axis, .. }
+            | Self::BadLimit { axis, .. }
+            | Self::BadRange { axis, .. }
+            | Self::OutOfRange { axis, .. }
+            | Self::BeyondCounts { axis, .. }
+            | Self::TooFast { axis, .. } => Some(*axis),
+            Self::Count { .. } | Self::TooLittleTime { .. } | Self::NoPath(_) => None,
+        }
+    }
+}
+
 /// Turns as they are shown: in degrees, as machine files and the command line have them.
 pub(super) const fn degrees(turns: f64) -> Shown {
     Shown(turns * 360.0)

@@ -47,8 +47,8 @@ impl Group {
         }
         let mut claims = Vec::new();
         for (number, axis) in (1..).zip(axes) {
-            axis.limits.check(number)?;
             let node = axis.drive.node().id();
+            axis.limits.check(number).map_err(|error| GroupError::Path { node: Some(node), error })?;
             if !network.is_same_as(axis.drive.node().network()) {
                 return Err(GroupError::OtherNetwork { node });
             }

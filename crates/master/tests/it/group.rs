@@ -403,11 +403,21 @@ fn bad_input_is_refused_before_anything_moves() {
     let mut group = bench.open();
     let from = places(&group);
     let refused = |group: &mut Group, to: &[f64]| group.start_move(&turns(to), None).unwrap_err();
-    assert!(matches!(refused(&mut group, &[0.0]), GroupError::Path(PathError::Count { given: 1, axes: 2 })));
+    assert!(matches!(
+        refused(&mut group, &[0.0]),
+        GroupError::Path { error: PathError::Count { given: 1, axes: 2 }, .. }
+    ));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert!(matches!(refused(&mut group, &[0.0, bad]), GroupError::Path(PathError::NoNumber { axis: 2, .. })));
+        assert!(matches!(
+            refused(&mut group, &[0.0, bad]),
+            GroupError::Path { error: PathError::NoNumber { axis: 2, .. }, .. }
+        ));
     }
-    assert!(matches!(refused(&mut group, &[0.0, 3.5]), GroupError::Path(PathError::OutOfRange { axis: 2, .. })));
+    let far = refused(&mut group, &[0.0, 3.5]);
+    assert!(matches!(far, GroupError::Path { error: PathError::OutOfRange { axis: 2, .. }, .. }));
+    // The node, too: axes are counted in the order of the group, and people know their nodes.
+    let node = group.drives()[1].node().id();
+    assert!(far.to_string().starts_with(&format!("node {node}: axis 2 would be at 1260 deg")), "{far}");
     assert!(matches!(group.push(&turns(&from)), Err(GroupError::Phase { phase: Phase::Holding, .. })));
     let far = [from[0] + 0.5, from[1]];
     for (last, is_refused) in [(&from[..], false), (&from[..1], true), (&far, true)] {
@@ -421,7 +431,7 @@ fn bad_input_is_refused_before_anything_moves() {
     let error = bench.try_open().unwrap_err();
     assert!(matches!(error, GroupError::BeyondDrive { axis: 2, .. }), "{error}");
     bench.setups[1].limits.velocity_turns_s = f64::NAN;
-    assert!(matches!(bench.try_open(), Err(GroupError::Path(PathError::BadLimit { axis: 2, .. }))));
+    assert!(matches!(bench.try_open(), Err(GroupError::Path { error: PathError::BadLimit { axis: 2, .. }, .. })));
     bench.setups.clear();
     assert!(matches!(bench.try_open(), Err(GroupError::NoAxis)));
     assert!(bench.network.cycle().is_some());

@@ -100,7 +100,7 @@ struct GroupOptions {
     /// Positions count from where each axis is
     #[arg(long)]
     relative: bool,
-    /// Highest speed of each axis
+    /// Highest speed of each axis; this and the next three lower a limit of the file, and do not raise it
     #[arg(long, value_name = "SPEED", value_parser = turning)]
     velocity: Option<Rpm>,
     /// Highest acceleration of each axis: 120rpm/s, 720deg/s2, 12.6rad/s2

@@ -21,6 +21,7 @@ pub(super) fn look(seen: &Observed, findings: &mut Vec<Finding>) {
         ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::CYCLIC_SYNCHRONOUS_VELOCITY => {
             let zero = zero(seen, "target_zero", target_velocity(seen), "A speed to turn at");
             findings.extend(zero.map(|finding| or_by_host_watch(seen, finding)));
+            findings.extend(seen.target_rpm.and_then(|target_rpm| at_software_limit(seen, target_rpm)));
         }
         ModeOfOperation::VELOCITY => {
             findings.extend(zero(seen, "target_zero", seen.place(VL_TARGET_VELOCITY), "A speed to turn at"));
@@ -216,8 +217,10 @@ fn software_limit(seen: &Observed) -> Option<Finding> {
     let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
     let target = seen.axis_value(TARGET_POSITION)?;
     // The limits are for positions, and this is a distance.
-    let relative = seen.controlword().is_some_and(|controlword| controlword.has(Controlword::RELATIVE));
-    (!relative && low < high && !(low..=high).contains(&target)).then(|| {
+    if seen.controlword().is_some_and(|controlword| controlword.has(Controlword::RELATIVE)) {
+        return at_software_limit(seen, target as f64);
+    }
+    (low < high && !(low..=high).contains(&target)).then(|| {
         cause(
             TOPIC,
             "software_limit",
@@ -229,6 +232,32 @@ fn software_limit(seen: &Observed) -> Option<Finding> {
             ],
         )
     })
+}
+
+/// The drive stands at the end of 607Dh to which it is asked to turn: this is no load.
+fn at_software_limit(seen: &Observed, heading: f64) -> Option<Finding> {
+    let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
+    let at = seen.axis_value(POSITION_ACTUAL_VALUE)?;
+    // A shaft that has been stopped there swings about it a little.
+    let near = high.checked_sub(low).filter(|span| *span > 0)? / 1000;
+    let (end, object) = match heading {
+        ..0.0 if at <= low + near => (low, MIN_POSITION_LIMIT),
+        0.0.. if heading > 0.0 && at >= high - near => (high, MAX_POSITION_LIMIT),
+        _ => return None,
+    };
+    if end.abs() >= i64::from(i32::MAX) {
+        return None;
+    }
+    Some(cause(
+        TOPIC,
+        "software_limit",
+        [
+            format!("A position from {low} to {high} counts (607Dh) with way left in the direction that is asked for"),
+            format!("Position {at}; its end there is {end} ({})", seen.place(object)),
+            "The drive does not turn beyond its software limits".to_owned(),
+            "Turn it the other way, or write 607Dh when the machine allows more".to_owned(),
+        ],
+    ))
 }
 
 /// Mode 6, by the model's own bits.
