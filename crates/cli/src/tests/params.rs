@@ -2,7 +2,7 @@
 
 use processes::scratch;
 
-use super::virtual_bus::VirtualBus;
+use super::virtual_bus::{VirtualBus, without_bus};
 
 fn bench() -> VirtualBus {
     VirtualBus::of(&["zlac8030l@4"])
@@ -76,4 +76,27 @@ fn what_cannot_be_stored_for_want_of_a_model_is_refused_before_the_first_write()
     let file = folder.values("wanted.toml", "1017 = 200\n");
     bench.refused(&["params", "apply", "4", &file, "--save"], &["--model 4=zlac8030l", "Nothing was sent"]);
     assert_eq!(bench.json(&["read", "4", "1017"])["value"], 0);
+}
+
+/// A file of a servo by its data sheet says the type of each value: it is read where that sheet is not known, and on the drive again.
+#[test]
+fn the_files_of_a_servo_by_its_data_sheet_are_compared_without_that() {
+    let folder = scratch("params_of_sheet");
+    let sheet = folder.write("maker.eds", &without_bus(&["eds", "cia402"]).out);
+    let bench = VirtualBus::of(&[&format!("{sheet}@5")]).with(&["--model", &format!("5={sheet}")]);
+    let [before, after] = ["before.toml", "after.toml"].map(|name| folder.path(name));
+    bench.done(&["params", "backup", "5", "-o", &before]);
+    bench.done(&["write", "5", "6072", "100"]);
+    bench.done(&["params", "backup", "5", "-o", &after]);
+    let compared = without_bus(&["--json", "params", "diff", &before, &after]).json();
+    let differences = compared["differences"].as_array().unwrap();
+    assert!(differences.len() == 1 && differences[0]["object"] == "6072h:00", "{compared}");
+    bench.done(&["params", "apply", "5", &before]);
+    assert_eq!(bench.json(&["read", "5", "6072"])["value"], 3000);
+    let other = std::fs::read_to_string(&after).unwrap().replace("\"u16:100\"", "\"u8:100\"");
+    folder.write("other.toml", &other);
+    bench.refused(
+        &["params", "apply", "5", &folder.path("other.toml")],
+        &["'u8:100' for 6072h:00 max_torque", "UNSIGNED16"],
+    );
 }

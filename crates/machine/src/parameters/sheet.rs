@@ -167,7 +167,7 @@ fn bytes_of(field: &Field<'_>, row: Option<&'static Entry>, resolution: i64) -> 
             field.problem(format!("'{}' is not an object of any known model: {reason}", field.name()))
         });
     };
-    let typed = typed_for(row, &text, resolution).map_err(refused)?;
+    let typed = typed_for(row, without_type(row, &text).map_err(refused)?, resolution).map_err(refused)?;
     if let Typed::Number(_, number) = typed
         && row.resolution.is_none()
         && row.check_value(number).is_err()
@@ -180,6 +180,33 @@ fn bytes_of(field: &Field<'_>, row: Option<&'static Entry>, resolution: i64) -> 
         )));
     }
     Ok(typed.bytes())
+}
+
+/// How types are written before a value whose object no table describes ([`typed_alone`]).
+const fn type_word(data_type: DataType) -> Option<&'static str> {
+    Some(match data_type {
+        DataType::Integer8 => "i8",
+        DataType::Integer16 => "i16",
+        DataType::Integer32 => "i32",
+        DataType::Integer64 => "i64",
+        DataType::Unsigned8 => "u8",
+        DataType::Unsigned16 => "u16",
+        DataType::Unsigned32 => "u32",
+        DataType::VisibleString => "text",
+        _ => return None,
+    })
+}
+
+/// The value behind its type, which a file for a model of a data sheet has, so that it can be read without that.
+fn without_type<'a>(row: &Entry, text: &'a str) -> Result<&'a str, String> {
+    let words = ["i8", "i16", "i32", "i64", "u8", "u16", "u32", "text"];
+    let Some((word, value)) = text.split_once(':').filter(|(word, _)| words.contains(word)) else { return Ok(text) };
+    match type_word(row.data_type) {
+        Some(own) if own == word => Ok(value),
+        // A text may begin with the name of a type.
+        _ if row.data_type == DataType::VisibleString => Ok(text),
+        _ => Err(format!("'{text}' for {} {}, which is of type {}", row.mux(), row.name, row.data_type.name())),
+    }
 }
 
 fn taken(row: &Entry) -> String {
@@ -209,33 +236,42 @@ pub fn print(parameters: &Parameters, model: Option<&'static Description>) -> St
     if !said.is_empty() {
         text += &format!("identity = {{ {} }}\n", said.join(", "));
     }
+    // Who has the file has not always the data sheet.
+    let typed = model.is_some_and(|model| resolve_model(model.name).is_err());
     text += "\n[values]\n";
     for (object, bytes) in &parameters.values {
         let row = model.and_then(|model| model.row(*object));
         // Writing into a String cannot fail.
-        let _ = writeln!(text, "\"{object:X}\" = {}{}", shown(row, bytes), remark(row, bytes));
+        let _ = writeln!(text, "\"{object:X}\" = {}{}", shown(row, bytes, typed), remark(row, bytes));
     }
     text
 }
 
-/// A value in the words of TOML.
-fn shown(row: Option<&Entry>, bytes: &[u8]) -> String {
+/// A value in the words of TOML; `typed` with its type.
+fn shown(row: Option<&Entry>, bytes: &[u8], typed: bool) -> String {
     let in_hexadecimal = || {
         let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         format!("\"hex:{digits}\"")
     };
     let Some(row) = row else { return in_hexadecimal() };
     match (row.data_type, Value::parse(row.data_type, bytes)) {
-        (_, Some(Value::Integer(number))) if row.is_communication() && row.data_type == DataType::Unsigned32 => {
-            format!("0x{number:X}")
+        (of, Some(Value::Integer(number))) => {
+            let in_hex = row.is_communication() && of == DataType::Unsigned32;
+            let number = if in_hex { format!("0x{number:X}") } else { number.to_string() };
+            match type_word(of) {
+                _ if !typed => number,
+                Some(word) => format!("\"{word}:{number}\""),
+                None => in_hexadecimal(),
+            }
         }
-        (_, Some(Value::Integer(number))) => number.to_string(),
         (DataType::VisibleString, Some(Value::Bytes(bytes)))
             if !bytes.is_empty()
                 && !bytes.starts_with(b"hex:")
+                && !bytes.starts_with(b"text:")
                 && bytes.iter().all(|byte| matches!(byte, b' '..=b'~')) =>
         {
-            toml::Value::String(bytes.iter().map(|byte| char::from(*byte)).collect()).to_string()
+            let text: String = bytes.iter().map(|byte| char::from(*byte)).collect();
+            toml::Value::String(if typed { format!("text:{text}") } else { text }).to_string()
         }
         _ => in_hexadecimal(),
     }

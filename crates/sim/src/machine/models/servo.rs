@@ -400,12 +400,13 @@ impl Assembly for ServoBench {
     fn report(&self, firmware: &ServoDrive<Boxed>, axis: AxisId, common: Report) -> Report {
         let counts_per_turn = f64::from(self.motor_at(axis).model.encoder.counts_per_turn());
         let number = usize::from(axis.0);
+        let has_brake = self.motor_at(axis).model.brake.holding_nm > 0.0;
         let released = self.last.axes.get(number).is_some_and(|axis| axis.brake_released);
         let report = Report {
             statusword: common.powered.then(|| firmware.statusword(number)).flatten(),
             outputs: Levels::new(OUTPUTS, &[released]),
             damage: self.damage(),
-            brake: Some(if released { Brake::Released } else { Brake::Engaged }),
+            brake: has_brake.then_some(if released { Brake::Released } else { Brake::Engaged }),
             ..common
         };
         match firmware.demand(number) {
