@@ -60,7 +60,7 @@ const LOOKING: &[Sense] = &[
     Sense { words: &["mode", "modes", "opmode", "set-mode"], tips: &["state 4", "write --help"] },
     Sense { words: &["accel", "acceleration", "ramp", "ramps"], tips: &["objects 4 acceleration"] },
     Sense { words: &["diff", "compare"], tips: &["params diff 4 drive.toml", "eds diff vendor.eds zlac8030l"] },
-    Sense { words: &["heartbeat", "hb", "alive", "watchdog"], tips: &["scan", "supervise"] },
+    Sense { words: &["heartbeat", "hb", "alive", "watchdog"], tips: &["scan", "read 4 1017", "supervise"] },
     Sense { words: &["canbusload", "busload", "load"], tips: &["plan", "top"] },
     Sense { words: &["nmt-state", "lifecycle"], tips: &["scan", "nmt 4 start --wait"] },
     Sense { words: &["status", "stat", "show", "drv-status", "query"], tips: &["state 4"] },

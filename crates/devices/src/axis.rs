@@ -35,6 +35,9 @@ pub struct AxisDescription {
     pub terminals: Terminals,
     /// What raw values are worth.
     pub units: Units,
+    /// Highest speed of its motor in r/min, to which the drive holds faster set-points, where the manual says it and no object
+    /// (6080h) does.
+    pub max_motor_rpm: Option<f64>,
     /// How its loops are set, where it has gains.
     pub loops: Option<Loops>,
     /// What keeps its rotor in step, where nothing measures it.

@@ -22,7 +22,7 @@ pub struct Limits {
     /// What divides the unit and has multiplied the limits.
     pub resolution: Option<Setting>,
     /// What holds back what a value effects, and from which magnitude on, in counts.
-    pub held_to: Option<(i64, Setting)>,
+    pub held_to: Option<(i64, HeldBy)>,
     /// What raises what a smaller value but 0 effects, and to which magnitude, in counts.
     pub raised_to: Option<(i64, Setting)>,
 }
@@ -38,6 +38,31 @@ pub struct Setting {
     pub value: i64,
     /// The drive goes by the value that was stored at its last restart, which is not to be read.
     pub since_restart: bool,
+}
+
+/// What keeps a value from acting as it stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldBy {
+    /// An object.
+    Setting(Setting),
+    /// The highest speed of the motor, by its manual.
+    Motor,
+}
+
+impl HeldBy {
+    /// The object, where it is one.
+    pub const fn setting(self) -> Option<Setting> {
+        if let Self::Setting(setting) = self { Some(setting) } else { None }
+    }
+}
+
+impl fmt::Display for HeldBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Setting(setting) => setting.fmt(f),
+            Self::Motor => f.write_str("the highest speed of its motor"),
+        }
+    }
 }
 
 /// A number that was asked for, as it is shown. A conversion ends at the bounds of 64 bits, and what was asked for is beyond.
@@ -61,10 +86,11 @@ impl Limits {
     }
 
     /// The magnitude that this value effects in place of its own, and by which setting, if one holds it back or raises it.
-    pub fn changed(&self, value: i64) -> Option<(i64, Setting)> {
+    pub fn changed(&self, value: i64) -> Option<(i64, HeldBy)> {
         let magnitude = value.unsigned_abs();
         let held = self.held_to.filter(|(most, _)| magnitude > most.unsigned_abs());
-        held.or(self.raised_to.filter(|(least, _)| value != 0 && magnitude < least.unsigned_abs()))
+        let raised = self.raised_to.filter(|(least, _)| value != 0 && magnitude < least.unsigned_abs());
+        held.or(raised.map(|(least, setting)| (least, HeldBy::Setting(setting))))
     }
 
     /// How many counts make one of the unit.
@@ -90,8 +116,8 @@ impl fmt::Display for Limits {
         if let Some(setting) = self.resolution {
             write!(f, ", by {setting}")?;
         }
-        if let Some((most, setting)) = self.held_to {
-            write!(f, "; it acts up to {most}, by {setting}")?;
+        if let Some((most, by)) = self.held_to {
+            write!(f, "; it acts up to {most}, by {by}")?;
         }
         match self.raised_to {
             Some((least, setting)) => write!(f, "; smaller values (except 0) act as {least}, by {setting}"),

@@ -78,6 +78,20 @@ fn what_a_servo_by_the_profile_holds_back_is_refused_before_anything_moves() {
     }
 }
 
+/// The motor of the M8025 does 1500 r/min, that of the M4230 2000 ("M Robot Joint Motor CanOpen Manual", Parameters), and 60FFh takes 3000.
+#[test]
+fn a_joint_is_not_asked_for_more_than_its_motor_does() {
+    for (model, most) in [("m8025e25b50", 1500), ("m4230e17b50", 2000)] {
+        let bench = VirtualBus::of(&[&format!("{model}@1")]).with(&["--model", &format!("1={model}")]);
+        let ended = bench.run(&["velocity", "1", &format!("{}rpm", most + 1)]);
+        let said = format!("it acts up to {most}, by the highest speed of its motor");
+        assert!(ended.status == Some(1) && ended.err.contains(&said), "{}", ended.err);
+        let taken = bench.json(&["objects", "1", "60FF"]);
+        assert_eq!(taken["objects"][0]["now"]["acts_up_to"], most, "{taken}");
+        bench.done(&["velocity", "1", &format!("{}rpm", most - 200), "--for", "100ms"]);
+    }
+}
+
 /// 607Dh (CiA 402-2, software position limit): a move beyond it is refused, and a motor that turns into it is not held by a load.
 #[test]
 fn software_limits_are_named_before_a_move_and_where_a_motor_has_turned_into_them() {

@@ -40,7 +40,7 @@ pub struct ObjectReport {
 
 /// What the object takes now, where other objects have a say in it.
 pub async fn moving_limits(drive: &Drive, row: Option<&Entry>) -> Result<Option<Limits>, Failure> {
-    match row.filter(|row| drive.description().is_some() && (row.resolution.is_some() || row.held_to.is_some())) {
+    match row.filter(|row| drive.description().is_some() && drive.is_limited_elsewhere(row)) {
         Some(row) => Ok(Some(drive.limits(row.mux()).await?)),
         None => Ok(None),
     }

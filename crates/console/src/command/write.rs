@@ -165,7 +165,7 @@ async fn with_limits(drive: &Drive, error: Error, number: Option<i64>) -> Failur
 
 #[cfg(test)]
 mod tests {
-    use master::drive::Setting;
+    use master::drive::{HeldBy, Setting};
 
     use super::*;
 
@@ -197,7 +197,7 @@ mod tests {
             high: 3000,
             listed: &[],
             resolution: None,
-            held_to: setting(2, 1500),
+            held_to: setting(2, 1500).map(|(most, setting)| (most, HeldBy::Setting(setting))),
             raised_to: setting(1, 50),
         };
         let text = |number| in_effect(&limits, number);

@@ -37,33 +37,42 @@ use variations::VARIATIONS;
 
 /// A model, and what it is with firmware 1.66.
 macro_rules! joints {
-    ($($(#[$what:meta])* $joint:ident, $edition:ident = $name:literal, $title:literal;)*) => {$(
+    ($($(#[$what:meta])* $joint:ident, $edition:ident = $name:literal, $title:literal, $axes:ident;)*) => {$(
         $(#[$what])*
         pub static $joint: Description = Description {
             editions: &[Edition { pick: Pick::of(VARIATIONS, "firmware", "1.66"), description: &$edition }],
-            ..joint($name, $title)
+            ..joint($name, $title, $axes)
         };
         /// The same with firmware 1.66.
         pub static $edition: Description = Description {
             dictionary: &TABLE_1_66,
             pdo: PdoRules { fixed_mapping: false, ..PDO_RULES },
-            ..joint($name, $title)
+            ..joint($name, $title, $axes)
         };
     )*};
 }
 
 joints! {
     /// The M4230E17B50.
-    M4230E17B50, M4230E17B50_1_66 = "m4230e17b50", "M4230E17B50 joint motor";
+    M4230E17B50, M4230E17B50_1_66 = "m4230e17b50", "M4230E17B50 joint motor", M4230_AXES;
     /// The M4230E17B80.
-    M4230E17B80, M4230E17B80_1_66 = "m4230e17b80", "M4230E17B80 joint motor";
+    M4230E17B80, M4230E17B80_1_66 = "m4230e17b80", "M4230E17B80 joint motor", M4230_AXES;
     /// The M8025E25B50.
-    M8025E25B50, M8025E25B50_1_66 = "m8025e25b50", "M8025E25B50 joint motor";
+    M8025E25B50, M8025E25B50_1_66 = "m8025e25b50", "M8025E25B50 joint motor", M8025_AXES;
     /// The M8025E25B80.
-    M8025E25B80, M8025E25B80_1_66 = "m8025e25b80", "M8025E25B80 joint motor";
+    M8025E25B80, M8025E25B80_1_66 = "m8025e25b80", "M8025E25B80 joint motor", M8025_AXES;
 }
 
-const fn joint(name: &'static str, title: &'static str) -> Description {
+/// Highest speed of the motor of the M4230, r/min ("Parameters": 2000).
+pub const M4230_MAX_RPM: f64 = 2000.0;
+
+/// Highest speed of the motor of the M8025, r/min ("Parameters": 1500, which is 30 r/min behind a gear of 50).
+pub const M8025_MAX_RPM: f64 = 1500.0;
+
+const M4230_AXES: &[AxisDescription] = &[AxisDescription { max_motor_rpm: Some(M4230_MAX_RPM), ..AXIS }];
+const M8025_AXES: &[AxisDescription] = &[AxisDescription { max_motor_rpm: Some(M8025_MAX_RPM), ..AXIS }];
+
+const fn joint(name: &'static str, title: &'static str, axes: &'static [AxisDescription]) -> Description {
     Description {
         name,
         title,
@@ -75,7 +84,7 @@ const fn joint(name: &'static str, title: &'static str) -> Description {
         dictionary: &TABLE,
         node_id: NodeId::new(1),
         bitrate: Some(Bitrate::M1),
-        axes: &[AXIS],
+        axes,
         host_watch: HostWatch::Heartbeat { consumer: Mux::new(0x1016, 1), fault: 0x20 },
         storage: STORAGE,
         faults: Faults {
@@ -116,6 +125,7 @@ const AXIS: AxisDescription = AxisDescription {
     homing: Some(HOMING),
     terminals: Terminals::NONE,
     loops: Some(LOOPS),
+    max_motor_rpm: None,
     open_loop: None,
     units: UNITS,
 };

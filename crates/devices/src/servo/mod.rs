@@ -81,6 +81,7 @@ pub const fn axis(placement: Placement, modes: &'static [ModeOfOperation]) -> Ax
         homing: Some(HOMING),
         terminals: Terminals::CIA402,
         loops: None,
+        max_motor_rpm: None,
         open_loop: None,
         units: UNITS,
     }

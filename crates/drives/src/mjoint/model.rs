@@ -1,5 +1,7 @@
 //! What differs between the four models, as const data ("M Robot Joint Motor CanOpen Manual", "Parameters").
 
+use devices::mjoint::{M4230_MAX_RPM, M8025_MAX_RPM};
+
 /// One model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Model {
@@ -42,7 +44,7 @@ const TORQUE_CONSTANT_NM_A: f32 = 1.0 / (core::f32::consts::SQRT_2 * 3.5);
 const M4230: Model = Model {
     name: "m4230",
     ratio: 1.0,
-    max_rpm: 2000.0,
+    max_rpm: M4230_MAX_RPM,
     pole_pairs: 21,
     resistance_ohm: 0.5 * 0.86,
     inductance_h: 0.5 * 0.8e-3,
@@ -52,7 +54,7 @@ const M4230: Model = Model {
 const M8025: Model = Model {
     name: "m8025",
     ratio: 1.0,
-    max_rpm: 1500.0,
+    max_rpm: M8025_MAX_RPM,
     pole_pairs: 21,
     resistance_ohm: 0.5 * 0.53,
     inductance_h: 0.5 * 0.5e-3,

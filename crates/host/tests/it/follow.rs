@@ -182,7 +182,8 @@ fn a_path_beyond_a_limit_is_refused_with_its_time_and_nothing_is_written() {
     assert_eq!(refused.kind, "out_of_limits");
     // 60 of 90 deg are passed where s - sin(2 pi s) / 2 pi = 2/3: s = 0.5847, after 1.17 s.
     assert!(
-        refused.what.contains("at 1.17 s axis 1 would be at 60.") || refused.what.contains("at 1.18 s axis 1"),
+        refused.what.contains("at 1.17 s node 1: axis 1 would be at 60.")
+            || refused.what.contains("at 1.18 s node 1: axis 1"),
         "{refused}"
     );
     let power = block_on(&mut bench.world, bench.drives[0].state()).unwrap().unwrap().power;

@@ -32,12 +32,12 @@ pub(super) fn limits(machine: &Machine, nodes: &BTreeMap<NodeId, IntendedNode>, 
 /// A wheel faster than its drive is refused when the base is opened.
 fn too_fast(node: &IntendedNode, base: &BasePlan, rpm_per_m_s: f64, at: Place, report: &mut Reporter<'_>) {
     let needed_rpm = base.limits.wheel_m_s * rpm_per_m_s;
-    let Some((most_rpm, object)) = highest(node).filter(|(most_rpm, _)| needed_rpm > most_rpm * (1.0 + 1e-9)) else {
+    let Some((most_rpm, by)) = highest(node).filter(|(most_rpm, _)| needed_rpm > most_rpm * (1.0 + 1e-9)) else {
         return;
     };
     let most_m_s = Shown(most_rpm / rpm_per_m_s);
     let what = format!(
-        "`wheel_m_s = {}` needs {} r/min of the drive, and it does {} r/min ({most_m_s} m/s) at most by {object}: the base is refused",
+        "`wheel_m_s = {}` needs {} r/min of the drive, and it does {} r/min ({most_m_s} m/s) at most by {by}: the base is refused",
         Shown(base.limits.wheel_m_s),
         Shown(needed_rpm),
         Shown(most_rpm),

@@ -6,6 +6,7 @@ use canopen::od::DefaultValue;
 use canopen::{Mux, NodeId};
 use cia402::object::{MAX_MOTOR_SPEED, MAX_POSITION_LIMIT, MAX_PROFILE_VELOCITY};
 use devices::{Quantity, Scale};
+use master::drive::HeldBy;
 use master::group::AxisSetup;
 use master::units::Shown;
 
@@ -69,14 +70,14 @@ fn too_fast(
     at: Place,
     report: &mut Reporter<'_>,
 ) {
-    let Some((shaft_rpm, object)) = highest(node) else { return };
+    let Some((shaft_rpm, by)) = highest(node) else { return };
     let (stated_rpm, most_rpm) =
         (axis.limits.velocity_turns_s * 60.0, shaft_rpm / machine.gear(axis.node).ratio().abs());
     if stated_rpm <= most_rpm * (1.0 + 1e-9) {
         return;
     }
     let what = format!(
-        "the group '{}' may move it at {} deg/s ({} r/min), and it does {} deg/s ({} r/min) at most by {object}: the group is refused",
+        "the group '{}' may move it at {} deg/s ({} r/min), and it does {} deg/s ({} r/min) at most by {by}: the group is refused",
         group.name,
         Shown(stated_rpm * 6.0),
         Shown(stated_rpm),
@@ -88,26 +89,30 @@ fn too_fast(
     report.say(Severity::Warning, at, what, next);
 }
 
-/// The highest speed of its shaft in r/min by its objects as they will be, and the object: as a drive that is there is asked for it.
-pub(super) fn highest(node: &IntendedNode) -> Option<(f64, Mux)> {
+/// The highest speed of its shaft in r/min by its objects as they will be or by its motor, and which of them: as a drive that is there
+/// is asked for it.
+pub(super) fn highest(node: &IntendedNode) -> Option<(f64, String)> {
     let model = node.description;
     let axis = model.first_axis()?;
     // 6080h is in r/min whatever the units of velocities are.
     let mut bounds = vec![(axis.object(MAX_MOTOR_SPEED), 1.0)];
-    let mut least: Option<(f64, Mux)> = None;
+    let mut least = axis.max_motor_rpm.map(|rpm| (rpm, HeldBy::Motor.to_string()));
+    let mut lower = |rpm: f64, object: Mux| {
+        if least.as_ref().is_none_or(|(least_rpm, _)| rpm < *least_rpm) {
+            least = Some((rpm, object.to_string()));
+        }
+    };
     if let Some(Quantity { object, scale: Scale::Shaft(rpm) }) = axis.units.target_velocity
         && let Some(row) = model.row(object)
     {
-        least = Some((row.limits_at(1).1 as f64 * rpm, object));
+        lower(row.limits_at(1).1 as f64 * rpm, object);
         bounds.push((axis.object(MAX_PROFILE_VELOCITY), rpm));
         bounds.extend(row.held_to.map(|held| (held.object, held.counts as f64 * rpm)));
     }
     for (object, rpm) in bounds {
         // Nothing could move within a limit of 0.
-        let Some(value) = value(node, object).filter(|value| *value > 0) else { continue };
-        let bound = value as f64 * rpm;
-        if least.is_none_or(|(least_rpm, _)| bound < least_rpm) {
-            least = Some((bound, object));
+        if let Some(value) = value(node, object).filter(|value| *value > 0) {
+            lower(value as f64 * rpm, object);
         }
     }
     least

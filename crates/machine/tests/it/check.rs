@@ -530,6 +530,16 @@ fn what_a_group_states_and_its_drives_do_not_do_or_do_not_know_is_said() {
         assert_eq!((said.len(), said[0].severity, said[0].node), (1, Severity::Warning, Some(4)), "{said:?}");
         assert!(said[0].what.contains(most) && said[0].next.contains("lower its `velocity_deg_s`"), "{said:?}");
     }
+    // "M Robot Joint Motor CanOpen Manual", Parameters: the motor of the M8025 does 1500 r/min, and 60FFh takes 3000.
+    for (speed, is_said) in [("9000", false), ("9006", true)] {
+        let joint = text("", "", &format!("velocity_deg_s = {speed}\n"), "").replace("zlac8030l", "m8025e25b50");
+        let said = found(&joint);
+        assert_eq!(said.len(), usize::from(is_said), "{said:?}");
+        assert!(
+            said.iter().all(|said| said.what.contains("(1500 r/min) at most by the highest speed of its motor")),
+            "{said:?}"
+        );
+    }
     let range = "range_deg = [-90, 45.5]\nvelocity_deg_s = 60\n";
     let said = found(&text("", "", range, ""));
     assert_eq!((said.len(), said[0].severity), (1, Severity::Note), "{said:?}");

@@ -4,7 +4,7 @@ use canopen::Mux;
 use cia402::{PowerState, Statusword};
 
 use crate::core::CycleLoss;
-use crate::limits::{AskedNumber, Limits, Setting};
+use crate::limits::{AskedNumber, HeldBy, Limits};
 use crate::units::{Amperes, Angle, Rpm, Shown, Turns};
 
 /// What a drive is to do in one cycle.
@@ -81,8 +81,8 @@ pub struct Bound {
     pub low: i64,
     /// Largest value, in counts.
     pub high: i64,
-    /// The object that sets them, where the model's table does not.
-    pub by: Option<Setting>,
+    /// What sets them, where the model's table does not.
+    pub by: Option<HeldBy>,
 }
 
 impl From<Limits> for Bound {
@@ -90,7 +90,7 @@ impl From<Limits> for Bound {
         let Limits { object, name, low, high, held_to, resolution, .. } = limits;
         let held = held_to.filter(|(most, _)| *most < high || -most > low);
         let most = held.map_or(i64::MAX, |(most, _)| most.saturating_abs());
-        let by = held.map(|(_, setting)| setting).or(resolution);
+        let by = held.map(|(_, by)| by).or(resolution.map(HeldBy::Setting));
         Self { object, name, low: low.max(-most), high: high.min(most), by }
     }
 }

@@ -13,7 +13,7 @@ use devices::{Quantity, Scale};
 use super::handle::Drive;
 use super::state::refused_is_none;
 use crate::error::Error;
-use crate::limits::{Limits, Setting};
+use crate::limits::{HeldBy, Limits, Setting};
 
 impl Drive {
     /// What an object takes at this time. Asks the drive for the objects that have a say in it.
@@ -37,11 +37,13 @@ impl Drive {
                 // A drive that refuses the object holds nothing back by it.
                 let setting = refused_is_none(self.setting(object).await)?;
                 // Of 0 it lets nothing move, or some devices everything: what keeps a drive from turning is another question.
-                setting.filter(|setting| setting.value != 0).map(|setting| (setting.value * counts * scale, setting))
+                setting
+                    .filter(|setting| setting.value != 0)
+                    .map(|setting| (setting.value * counts * scale, HeldBy::Setting(setting)))
             }
             None => {
                 let greatest = self.amount(row.mux(), VL_VELOCITY_MAX_AMOUNT).await?;
-                greatest.map(|(counts, setting)| (counts as i64, setting))
+                greatest.map(|(counts, setting)| (counts as i64, HeldBy::Setting(setting)))
             }
         };
         let held_to = match self.motor_speed(row.mux()).await? {
@@ -70,18 +72,23 @@ impl Drive {
         Ok(Some((setting.value as f64 / factor.abs(), setting)))
     }
 
-    /// What holds back a speed beside the object of its own row: 6080h, which is in r/min of the motor whatever the units are
-    /// (CiA 402-2, max motor speed), in counts of this object; 0 limits nothing.
-    async fn motor_speed(&self, object: Mux) -> Result<Option<(i64, Setting)>, Error> {
+    /// What holds back a speed beside the object of its own row, in counts of this object: 6080h, which is in r/min of the motor whatever
+    /// the units are (CiA 402-2, max motor speed) and of which 0 limits nothing, or the motor itself.
+    async fn motor_speed(&self, object: Mux) -> Result<Option<(i64, HeldBy)>, Error> {
+        let Some(quantity) = self.speed_of_standard(object) else { return Ok(None) };
         let most = self.place(MAX_MOTOR_SPEED);
-        let Some(quantity) = self.speed_of_standard(object).filter(|_| self.row(most, "find out its limits").is_ok())
-        else {
-            return Ok(None);
+        let (rpm, by) = match self.axis_description().and_then(|axis| axis.max_motor_rpm) {
+            Some(rpm) => (rpm, HeldBy::Motor),
+            None if self.row(most, "find out its limits").is_err() => return Ok(None),
+            None => {
+                let setting = refused_is_none(self.setting(most).await)?.filter(|setting| setting.value > 0);
+                let Some(setting) = setting else { return Ok(None) };
+                (setting.value as f64, HeldBy::Setting(setting))
+            }
         };
-        let setting = refused_is_none(self.setting(most).await)?.filter(|setting| setting.value > 0);
-        let Some(setting) = setting else { return Ok(None) };
-        let counts = self.gear.at_output(setting.value as f64) / self.step_of(quantity).await?.abs();
-        Ok(Some((counts as i64, setting)))
+        let counts = self.gear.at_output(rpm) / self.step_of(quantity).await?.abs();
+        // 1500 r/min may be a count less by the rounding of a quotient.
+        Ok(Some(((counts + 1e-6) as i64, by)))
     }
 
     /// The target or profile velocity of an axis that has them where the standard does.
@@ -118,12 +125,22 @@ impl Drive {
         };
         let row = self.row(self.place(TARGET_POSITION), "find out its limits")?;
         let limits = self.limits_of(row).await?;
-        Err(self.out_of_limits(asked, Limits { held_to: Some((bound.value, bound)), ..limits }))
+        Err(self.out_of_limits(asked, Limits { held_to: Some((bound.value, HeldBy::Setting(bound))), ..limits }))
     }
 
     fn scale_of_velocity_mode(&self, target: Mux) -> Option<Scale> {
         let quantity = self.axis_description()?.units.target_velocity?;
         (quantity.object == target && target == self.place(VL_TARGET_VELOCITY)).then_some(quantity.scale)
+    }
+
+    /// Whether what this object takes, or what of it acts, is not in its row alone: another object has a say in it, or the motor.
+    pub fn is_limited_elsewhere(&self, row: &Entry) -> bool {
+        let (object, most) = (row.mux(), self.place(MAX_MOTOR_SPEED));
+        let by_motor = || {
+            let by_manual = self.axis_description().is_some_and(|axis| axis.max_motor_rpm.is_some());
+            self.speed_of_standard(object).is_some() && (by_manual || self.row(most, "find out its limits").is_ok())
+        };
+        row.resolution.is_some() || row.held_to.is_some() || self.scale_of_velocity_mode(object).is_some() || by_motor()
     }
 
     async fn setting(&self, object: Mux) -> Result<Setting, Error> {
@@ -151,10 +168,7 @@ impl Drive {
     /// back, or raise, is refused too.
     pub(crate) async fn check_effect(&self, mux: Mux, value: i64) -> Result<&'static Entry, Error> {
         let row = self.check_number(mux, value).await?;
-        let is_held = row.held_to.is_some()
-            || self.speed_of_standard(mux).is_some()
-            || self.scale_of_velocity_mode(mux).is_some();
-        if !is_held || value == 0 {
+        if value == 0 || !self.is_limited_elsewhere(row) {
             return Ok(row);
         }
         let limits = self.limits_of(row).await?;

@@ -27,7 +27,7 @@ mod store;
 
 pub use crate::error::{Explanation, Fact};
 pub use crate::host_loss::HostLoss;
-pub use crate::limits::{Limits, Setting};
+pub use crate::limits::{HeldBy, Limits, Setting};
 pub use command::{Command, Manner, Motion, ParseCommandError, Report};
 pub(crate) use conclude::Trigger;
 pub use everything::{StopWay, StoppedAxis};

@@ -10,6 +10,7 @@ use cia402::{ModeOfOperation, PowerState};
 use devices::servo::CIA402;
 use master::core::CycleLoss;
 use master::cyclic::{CyclicDrive, CyclicError, CyclicOptions, CyclicState, Demand, Refusal};
+use master::drive::HeldBy;
 use master::drive::MotionOptions;
 use master::units::{Amperes, Angle, Rpm, Turns};
 use master::{Drive, Network};
@@ -164,7 +165,7 @@ fn a_step_beyond_607fh_is_refused() {
     let to = |turns: f64| Demand::Position(Angle::Turns(from + turns));
     let state = bench.run(&mut cyclic, 10, |_| to(0.01));
     let Some(Refusal::StepTooLarge { bound, .. }) = state.refused else { panic!("{state}") };
-    assert_eq!(bound.by.map(|setting| setting.object), Some(mux(0x607F, 0)), "{bound}");
+    assert_eq!(bound.by.and_then(HeldBy::setting).map(|setting| setting.object), Some(mux(0x607F, 0)), "{bound}");
     // A hundredth of a turn at two turns a second takes 5 ms.
     let state = bench.run(&mut cyclic, 6, |cycle| to(0.01 * f64::from(cycle + 1) / 6.0));
     assert_eq!(state.refused, None, "{state}");

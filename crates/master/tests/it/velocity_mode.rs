@@ -120,7 +120,10 @@ fn factors_of_the_drive_scale_the_target_and_limits_refuse_it_before_anything_mo
     assert!((bench.rpm() - 300.0).abs() < 5.0, "{}", bench.rpm());
     let error = bench.run(async |drive| drive.velocity(Rpm(600.0), options()).await).unwrap_err();
     let Error::OutOfLimits { asked, limits, .. } = &error else { panic!("{error}") };
-    assert_eq!((*asked, limits.held_to.map(|(most, setting)| (most, setting.value))), (6000, Some((5000, 500))));
+    assert_eq!(
+        (*asked, limits.held_to.map(|(most, by)| (most, by.setting().unwrap().value))),
+        (6000, Some((5000, 500)))
+    );
     assert_eq!(bench.number(0x6042, 0), 3000, "{error}");
 }
 

@@ -134,8 +134,8 @@ struct By {
 
 impl Now {
     fn of(limits: &Limits) -> Self {
-        let amounts = [limits.held_to, limits.raised_to].into_iter().flatten().map(|(_, setting)| setting);
-        let settings = limits.resolution.into_iter().chain(amounts);
+        let held = limits.held_to.and_then(|(_, by)| by.setting());
+        let settings = [limits.resolution, held, limits.raised_to.map(|(_, setting)| setting)].into_iter().flatten();
         let by = settings.map(|Setting { object, name, value, since_restart }| By {
             object: object.to_string(),
             name,
@@ -170,7 +170,10 @@ impl Objects {
         let drive = context.known_drive(node).await?;
         let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
         let mut list = ObjectList { guess: guessed(&drive), ..self.list(model)? };
-        for row in list.objects.iter_mut().filter(|row| row.limits_times.is_some() || row.acts_up_to.is_some()) {
+        for row in &mut list.objects {
+            if !model.row(row.mux).is_some_and(|row| drive.is_limited_elsewhere(row)) {
+                continue;
+            }
             row.now = Some(Now::of(&drive.limits(row.mux).await?));
         }
         Ok(list)

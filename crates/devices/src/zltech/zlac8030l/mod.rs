@@ -92,6 +92,7 @@ const AXIS: AxisDescription = AxisDescription {
         driver_temperature: Some(Quantity::new(0x2026, 2, 0.1)),
     },
     loops: Some(LOOPS),
+    max_motor_rpm: None,
     open_loop: None,
 };
 

@@ -76,6 +76,7 @@ const AXIS: AxisDescription = AxisDescription {
     homing: Some(HOMING),
     terminals: TERMINALS,
     loops: None,
+    max_motor_rpm: None,
     open_loop: Some(OPEN_LOOP),
     units: UNITS,
 };
