@@ -8,7 +8,7 @@ use sim::command::Command as WorldCommand;
 use super::command::{Command, PdoCommand};
 use super::condition::{Condition, signal};
 use super::plan::{
-    Act, Base, Expect, Host, HostLine, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until, WantedResult,
+    Act, Base, Expect, Host, HostLine, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until, Wait, WantedResult,
 };
 use words::document::Problem;
 use words::document::reader::{Field, Table};
@@ -96,7 +96,10 @@ fn base(table: &Table<'_>, absolute: &str) -> Result<Base, Problem> {
     match (table.get(absolute), table.get("after")) {
         (Some(_), Some(after)) => Err(after.problem(format!("it has '{absolute}' already; give one of them"))),
         (Some(at), None) => Ok(Base::At(bounded(&at, Duration::ZERO)?)),
-        (None, Some(after)) => Ok(Base::After(after.words("the name of a step or a host")?)),
+        (None, Some(after)) => {
+            let place = after.problem("").locate(after.source_text());
+            Ok(Base::After(after.words("the name of a step or a host")?, place))
+        }
         (None, None) => Ok(Base::At(Duration::ZERO)),
     }
 }
@@ -116,7 +119,11 @@ pub(super) fn step(table: &Table<'_>) -> Many<ScenarioStep> {
     const EXPECTED: &str = "a world command or a list of them, e.g. \"4 supply 20\"";
     let mut problems = table.strangers(STEP_KEYS);
     let parts = (|| {
-        let when = table.get("when").map(|field| condition(&field)).transpose()?;
+        let wait = |field: Field<'_>| {
+            let place = field.problem("").locate(field.source_text());
+            Ok(Wait { condition: condition(&field)?, asked: field.words("a condition as text")?, place })
+        };
+        let when = table.get("when").map(wait).transpose()?;
         if let (None, Some(field)) = (&when, table.get("within")) {
             return Err(field.problem("'within' needs 'when'"));
         }

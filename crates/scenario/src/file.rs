@@ -205,12 +205,11 @@ impl Scenario {
                 ));
             }
         };
-        let base = |base: &Base| match base {
-            Base::At(_) => None,
-            Base::After(name) => Some(name.clone()),
-        };
-        self.steps.iter().for_each(|step| base(&step.base).iter().for_each(|name| named(name, &step.place)));
-        self.expects.iter().for_each(|expect| base(&expect.from).iter().for_each(|name| named(name, &expect.place)));
+        for base in self.steps.iter().map(|step| &step.base).chain(self.expects.iter().map(|expect| &expect.from)) {
+            if let Base::After(name, at) = base {
+                named(name, at);
+            }
+        }
         for (condition, at) in self.conditions() {
             let mut places = Vec::new();
             condition.names(&mut |place| places.push(place), &mut |name| named(name, at));
@@ -355,7 +354,7 @@ impl Scenario {
 
     /// Every condition of it, and where it stands.
     fn conditions(&self) -> impl Iterator<Item = (&Condition, &Located)> {
-        let steps = self.steps.iter().filter_map(|step| Some((step.when.as_ref()?, &step.place)));
+        let steps = self.steps.iter().filter_map(|step| step.when.as_ref().map(|when| (&when.condition, &when.place)));
         let lines = self.hosts.iter().flat_map(|host| &host.lines).filter_map(|line| match &line.command {
             Command::WaitFor(condition, _) => Some((condition, &line.place)),
             _ => None,

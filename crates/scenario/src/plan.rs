@@ -20,10 +20,18 @@ use words::document::Located;
 pub(super) struct ScenarioStep {
     pub(super) name: Option<String>,
     pub(super) base: Base,
-    pub(super) when: Option<Condition>,
+    pub(super) when: Option<Wait>,
     pub(super) within: Option<Duration>,
     pub(super) delay: Duration,
     pub(super) acts: Vec<Act>,
+    pub(super) asked: String,
+    pub(super) place: Located,
+}
+
+/// What a step waits for.
+#[derive(Clone, Debug)]
+pub(super) struct Wait {
+    pub(super) condition: Condition,
     pub(super) asked: String,
     pub(super) place: Located,
 }
@@ -34,7 +42,7 @@ pub(super) enum Base {
     /// A time of the run.
     At(Duration),
     /// When the step or host of this name is done.
-    After(String),
+    After(String, Located),
 }
 
 /// One thing that the outer world does.

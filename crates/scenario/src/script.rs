@@ -10,7 +10,9 @@ use super::condition::{View, of_body};
 use super::file::Scenario;
 use super::occurrence::Occurrence;
 use super::outcome::{Row, RowKind, Verdict};
-use super::plan::{Act, Base, Expect, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until};
+use super::plan::{Act, Base, Expect, Law, Measure, PlannedFigure, ScenarioStep, Statistic, Until, Wait};
+use master::units::Shown;
+use words::document::Located;
 
 /// The state of everything that is not a host.
 pub(super) struct Script {
@@ -98,7 +100,7 @@ impl Script {
     fn begin(&self, base: &Base) -> Option<Instant> {
         match base {
             Base::At(time) => Some(instant(*time)),
-            Base::After(name) => self.done_at(name),
+            Base::After(name, _) => self.done_at(name),
         }
     }
 
@@ -114,7 +116,7 @@ impl Script {
     pub(super) fn samples(&self, scenario: &Scenario) -> bool {
         let signals = scenario.figures.iter().any(|figure| !matches!(figure.of, Measure::Time(_)));
         let steps = scenario.steps.iter().zip(&self.steps).any(|(step, progress)| {
-            *progress == StepProgress::Waiting && step.when.as_ref().is_some_and(|when| !when.is_event())
+            *progress == StepProgress::Waiting && step.when.as_ref().is_some_and(|when| !when.condition.is_event())
         });
         let expects = scenario.expects.iter().zip(&self.expects);
         signals
@@ -172,7 +174,7 @@ impl Script {
                 self.steps[n] = StepProgress::Done;
                 let refused = self.act(step, world, host);
                 let verdict = if refused.is_none() { Verdict::Passed } else { Verdict::Failed };
-                self.row_of_step(step, Some(now), verdict, refused.unwrap_or_else(|| "done".into()));
+                self.row_of_step((step, &step.place), Some(now), verdict, refused.unwrap_or_else(|| "done".into()));
                 if let Some(name) = &step.name {
                     self.note_done(name, now);
                 }
@@ -186,7 +188,7 @@ impl Script {
     fn arm(&mut self, n: usize, step: &ScenarioStep, world: &mut World, occurrence: Option<Occurrence<'_>>) {
         let now = world.now();
         let Some(begin) = self.begin(&step.base).filter(|begin| *begin <= now) else { return };
-        let Some(when) = &step.when else {
+        let Some(Wait { condition: when, asked, place }) = &step.when else {
             self.steps[n] = StepProgress::Due(begin + step.delay);
             return;
         };
@@ -197,11 +199,12 @@ impl Script {
                 return;
             }
         }
-        if step.within.is_some_and(|within| now >= begin + within) {
+        if let Some(within) = step.within.filter(|within| now >= begin + *within) {
             let done = |name: &str| self.is_done(name);
             let seen = when.seen(&mut View { world, occurrence: None, done: &done });
             self.steps[n] = StepProgress::Done;
-            self.row_of_step(step, Some(now), Verdict::Failed, format!("its condition did not hold in time: {seen}"));
+            let seen = format!("'{asked}' did not hold within {} s: {seen}", Shown(within.as_secs_f64()));
+            self.row_of_step((step, place), Some(now), Verdict::Failed, seen);
         }
     }
 
@@ -234,9 +237,15 @@ impl Script {
         None
     }
 
-    fn row_of_step(&mut self, step: &ScenarioStep, at: Option<Instant>, verdict: Verdict, seen: String) {
+    fn row_of_step(
+        &mut self,
+        (step, place): (&ScenarioStep, &Located),
+        at: Option<Instant>,
+        verdict: Verdict,
+        seen: String,
+    ) {
         let (name, asked) = (step.name.clone().unwrap_or_default(), step.asked.clone());
-        self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: step.place.line });
+        self.rows.push(Row { kind: RowKind::Step, name, asked, at, seen, verdict, place: place.line });
     }
 
     fn look_at_expectations(&mut self, scenario: &Scenario, world: &mut World, occurrence: Option<Occurrence<'_>>) {
@@ -321,8 +330,13 @@ impl Script {
             if self.steps[n] != StepProgress::Done {
                 let done = |name: &str| self.is_done(name);
                 let mut view = View { world, occurrence: None, done: &done };
-                let seen = step.when.as_ref().map(|when| format!(": {}", when.seen(&mut view))).unwrap_or_default();
-                self.row_of_step(step, None, Verdict::Failed, format!("its time never came{seen}"));
+                let (place, seen) = match &step.when {
+                    Some(Wait { condition, asked, place }) => {
+                        (place, format!("'{asked}' did not come to hold: {}", condition.seen(&mut view)))
+                    }
+                    None => (&step.place, "its time never came".to_owned()),
+                };
+                self.row_of_step((step, place), None, Verdict::Failed, seen);
             }
         }
         for (n, expect) in scenario.expects.iter().enumerate() {

@@ -94,6 +94,26 @@ fn a_million_of_anything_is_refused_or_taken_in_good_time() {
     assert!(refusal(&keys).contains("and 49980 more like these"));
 }
 
+/// The line of `when` or `after`, and not that of what the step does.
+#[test]
+fn what_a_step_waits_for_is_marked_where_it_stands() {
+    let lines = MACHINE.lines().count();
+    for (waits, said) in [
+        ("when = '7 velocity > 5'", "the machine has no node 7"),
+        ("when = 'done missing'", "there is no step or host 'missing'"),
+        ("after = 'missing'", "there is no step or host 'missing'"),
+    ] {
+        let refused = parse(&format!("{MACHINE}[[step]]\ndo = '4 rotor lock'\n{waits}\n")).err().unwrap().to_string();
+        let at = format!("line {}, column", lines + 3);
+        assert!(refused.contains(&at) && refused.contains(said), "{refused}");
+    }
+    let text = format!("{MACHINE}[[step]]\ndo = '4 rotor lock'\nwithin = '200ms'\nwhen = '4 velocity > 5'\n");
+    let scenario = parse(&text).unwrap_or_else(|bad| panic!("{bad}"));
+    let outcome = Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run();
+    let rows: Vec<_> = outcome.failures().map(|row| (row.place, row.seen.as_str())).collect();
+    assert_eq!(rows, [(lines + 4, "'4 velocity > 5' did not hold within 0.2 s: 0 r/min")]);
+}
+
 #[test]
 fn what_would_never_end_ends_at_the_limit_and_says_what_it_waited_for() {
     let text = format!(
@@ -105,7 +125,7 @@ fn what_would_never_end_ends_at_the_limit_and_says_what_it_waited_for() {
     assert_eq!(Duration::from_nanos(outcome.end.as_nanos()), Duration::from_millis(500));
     let seen: Vec<_> = outcome.failures().map(|row| row.seen.as_str()).collect();
     let expected = [
-        "its time never came: 0 r/min",
+        "'4 velocity > 5' did not come to hold: 0 r/min",
         "not done by the end of the run",
         "not reached",
         "not by the end of the run: no fault",

@@ -15,6 +15,7 @@ use words::drive::{DriveSpec, drive_spec};
 use words::unresolved::Unresolved;
 
 use super::dcf::{keep, new_file};
+use crate::embedded::ordered_drive;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::output::Report;
@@ -122,6 +123,10 @@ impl Init {
             return Err(Failure::usage(format!("two drives at node {node}"))
                 .because("a node-ID may be used once on a bus")
                 .next(format!("give the second --drive {model}@... another node-ID")));
+        }
+        // What a drive does not take is refused here, and not by the first command that reads the file.
+        for drive in &self.drives {
+            ordered_drive(drive.spec.model, &drive.spec.order(self.bitrate.unwrap_or(BITRATE)))?;
         }
         Ok(self.drives.iter().map(|drive| InitNode::named(&drive.text, &drive.spec)).collect())
     }
