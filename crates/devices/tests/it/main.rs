@@ -1,3 +1,4 @@
 //! Descriptions from outside the crate. One program: a file each.
 
+mod pages;
 mod two_axes;
