@@ -16,12 +16,13 @@ mod run;
 mod session;
 mod ways_back;
 
+pub use crate::network::params::SeenBy;
 pub use measurand::{Measurand, TRUE, TrueValue, Way};
 pub use of_log::record_of_log;
 pub use plain::Captured;
 pub use plan::{CapturePlan, Pace, Request, plan};
 pub use quantity::{Form, Quantity, short_names};
-pub use restorer::{Restorer, SeenBy, not_put_back, with_left};
+pub use restorer::{Restorer, not_put_back, with_left};
 pub use rows::Trigger;
 pub(crate) use run::{CaptureOutcome, CaptureRun, NamedCapture};
 pub use session::{Running, Span, Taken, Wanted};

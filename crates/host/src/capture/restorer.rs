@@ -4,12 +4,12 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use can::Instant;
-use canopen::{Mux, NmtCommand, NmtState, NodeId};
+use canopen::{Mux, NodeId};
 use master::parameters::{Undone, roll_back};
 use master::{Drive, Node};
 
 use crate::network::params::journal::Kept;
+use crate::network::params::pre_operational::{SeenBy, leave_operational};
 use crate::stopping::bring_to_rest;
 use words::failure::Failure;
 
@@ -54,44 +54,6 @@ struct WrittenObjects {
     /// Their copy on the disk.
     journal: Option<Kept>,
 }
-
-/// By what a node was seen to be pre-operational again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SeenBy {
-    /// Its heartbeat has that state.
-    Heartbeat,
-    /// TPDOs that came until then have stopped.
-    Silence,
-    /// Nothing that it sends shows it.
-    Nothing,
-}
-
-impl SeenBy {
-    /// In a word, for programs.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Heartbeat => "heartbeat",
-            Self::Silence => "no more frames",
-            Self::Nothing => "nothing",
-        }
-    }
-
-    /// In words, for people.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Heartbeat => "by its heartbeat it is pre-operational again",
-            Self::Silence => "commanded to be pre-operational again, it has stopped sending PDOs",
-            Self::Nothing => "it was commanded to be pre-operational again, which nothing that it sends confirms",
-        }
-    }
-}
-
-/// How long a node may take to show that it is pre-operational.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// How often is looked for that.
-const LOOK: Duration = Duration::from_millis(10);
-/// Frames that are kept between two looks: whether one came is what counts.
-const FEW: usize = 8;
 
 impl Restorer {
     /// Of a drive of which nothing has been changed yet.
@@ -249,38 +211,8 @@ impl Restorer {
 
     /// Commands the node to be pre-operational, as it was, and looks whether it is.
     async fn leave_operational(&self) -> Result<(), String> {
-        let network = self.node().network();
         let sending = self.lock().sending.clone();
-        let log = sending.as_ref().map(|(ids, _)| network.log_frames(ids, FEW));
-        self.node().nmt(NmtCommand::EnterPreOperational);
-        let commanded = network.now();
-        let (mut heard_at, mut frames) = (commanded, Vec::new());
-        let seen = loop {
-            network.sleep(LOOK).await;
-            let (now, facts) = (network.now(), self.node().facts());
-            if let Some(log) = &log {
-                log.take(&mut frames);
-                heard_at = frames.drain(..).map(|frame| frame.at).fold(heard_at, Instant::max);
-            }
-            let has_beaten = facts.heartbeat_at.is_some_and(|at| at > commanded);
-            // The heartbeat of some models shows an alarm in place of the state.
-            let shows_state =
-                self.drive.description().zip(facts.nmt_state).is_none_or(|(model, said)| !model.tells_alarm(said));
-            let state = facts.probable_state(self.drive.description());
-            if has_beaten && shows_state && state == Some(NmtState::PreOperational) {
-                break Ok(SeenBy::Heartbeat);
-            }
-            let quiet = sending.as_ref().is_some_and(|(_, period)| now - heard_at > *period * 2 + LOOK);
-            // A heartbeat says more than silence does: it is waited for where there is one.
-            let booted_at = facts.boot_up.map(|(at, _)| at);
-            let waits = facts.heartbeat_at > booted_at && now - commanded < PATIENCE;
-            match (quiet, &sending) {
-                (true, _) if !waits => break Ok(SeenBy::Silence),
-                (_, None) if !waits => break Ok(SeenBy::Nothing),
-                _ if now - commanded > PATIENCE * 2 => break Err("NMT state: it still sends PDOs".to_owned()),
-                _ => {}
-            }
-        };
+        let seen = leave_operational(&self.drive, sending.as_ref()).await;
         let mut changed = self.lock();
         changed.started = seen.is_err();
         changed.left_operational = seen.as_ref().ok().copied();

@@ -236,8 +236,11 @@ impl Wanted {
         let node = drive.node();
         let wanted = Parameters { node: Some(node.id()), values: plan.values.clone(), ..Parameters::default() };
         let steps = drive.plan_parameters(&wanted, PlanOptions::default()).await.map_err(source::refused)?;
-        if !steps.steps.is_empty() {
-            let journal = Journal { node: node.id(), identity: steps.identity, undo: steps.undo() };
+        let state = node.facts().probable_state(drive.description());
+        let pre_operational = state == Some(NmtState::PreOperational);
+        // What is not changed but for its state is led back by a journal too: it is started, and its PDOs go on for ever.
+        if !steps.steps.is_empty() || pre_operational {
+            let journal = Journal { node: node.id(), identity: steps.identity, pre_operational, undo: steps.undo() };
             let kept = self.journal.as_deref().map(|path| Kept::create(path, &journal, self.on_kept)).transpose()?;
             restorer.note_written(journal.undo, kept);
             match drive.apply_tpdos(&steps).await.map_err(source::refused)? {

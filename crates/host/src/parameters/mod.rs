@@ -314,7 +314,7 @@ pub(crate) async fn write(
     let plan = plan(drive, model, wanted).await.map_err(|refusal| (refusal, None))?;
     let journals = journals.filter(|_| !plan.steps.is_empty());
     if let Some(journals) = journals {
-        let journal = Journal { node: plan.node, identity: plan.identity, undo: plan.undo() };
+        let journal = Journal { node: plan.node, identity: plan.identity, pre_operational: false, undo: plan.undo() };
         journals.begin(&journal).map_err(|why| (("journal", format!("nothing was written: {why}")), None))?;
     }
     // A journal that is left can be applied later: ferrodrive params rollback.

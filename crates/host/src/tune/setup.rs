@@ -168,7 +168,7 @@ pub(super) async fn keep(
     };
     let nothing = Parameters::default();
     let identity = drive.plan_parameters(&nothing, PlanOptions::default()).await.map_err(source::refused)?.identity;
-    let journal = Journal { node: drive.node().id(), identity, undo };
+    let journal = Journal { node: drive.node().id(), identity, pre_operational: false, undo };
     let kept = Kept::create(path, &journal, on_kept)?;
     restorer.note_written(journal.undo, Some(kept));
     Ok(())

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use can::{Bitrate, Instant};
-use canopen::{Mux, NmtCommand, NodeId};
+use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use host::capture::{Measurand, Pace, Restorer, Running, SeenBy, Span, Taken, Wanted, Way};
 use host::network::params::journal::roll_back_by;
 use master::drive::MotionOptions;
@@ -352,6 +352,36 @@ fn roll_back(bench: &mut Bench, path: &Path, what: (&str, u64)) {
     if path.exists() {
         let drive = bench.drive.clone();
         bench.run(roll_back_by(path, &drive)).unwrap_or_else(|failure| panic!("{what:?}: {failure}"));
+    }
+}
+
+/// A node that a capture has started goes back to pre-operational, by the journal as by the capture's own end; one that was operational
+/// stays so.
+#[test]
+fn a_capture_that_is_killed_leaves_a_journal_that_leads_the_nmt_state_back() {
+    for (start, heartbeat_ms, back) in [(false, 50_u16, Some("heartbeat")), (true, 50, None)] {
+        let mut bench = Bench::new("zlac8030l");
+        bench.run(bench.drive.clone().node().write(Mux::new(0x1017, 0), heartbeat_ms)).expect("written");
+        if start {
+            bench.network.node(node()).nmt(NmtCommand::Start);
+        }
+        bench.world.run_for(Duration::from_millis(200));
+        let path = scratch(&format!("state-{start}"));
+        let wanted = bench.wanted(&["velocity"], Some(path.clone()));
+        let (drive, restorer) = (bench.drive.clone(), Restorer::of(&bench.drive));
+        let capturing = async { wanted.begin(&drive, &restorer).await?.next(&at_once(10_000)).await };
+        block_on_for(&mut bench.world, Duration::from_secs(3), capturing).expect_err("it goes on");
+        bench.begin_anew();
+        bench.world.run_for(Duration::from_millis(200));
+        let state = |bench: &Bench| bench.network.facts(node()).nmt_state;
+        assert_eq!(state(&bench), Some(NmtState::Operational), "started: {start}");
+        let drive = bench.drive.clone();
+        let report = bench.run(roll_back_by(&path, &drive)).unwrap_or_else(|failure| panic!("{failure}"));
+        assert_eq!(report.nmt_back, back, "started: {start}");
+        bench.world.run_for(Duration::from_millis(200));
+        let expected = if start { NmtState::Operational } else { NmtState::PreOperational };
+        assert_eq!(state(&bench), Some(expected), "started: {start}");
+        let _ = std::fs::remove_dir_all(path.parent().expect("a folder"));
     }
 }
 

@@ -21,6 +21,8 @@ pub struct Journal {
     pub node: NodeId,
     /// What the node said that it is.
     pub identity: Identity,
+    /// The node was pre-operational, and has been started by what is led back.
+    pub pre_operational: bool,
     /// The writes in their order.
     pub undo: Vec<(Mux, Vec<u8>)>,
 }
@@ -41,6 +43,9 @@ impl Journal {
                 let _ = writeln!(text, "{name} = 0x{number:X}");
             }
         }
+        if self.pre_operational {
+            let _ = writeln!(text, "{STATE} = {PRE_OPERATIONAL:?}");
+        }
         text += "undo = [\n";
         for (object, bytes) in &self.undo {
             let digits: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
@@ -59,10 +64,14 @@ impl Journal {
     }
 }
 
+/// The state to which the node goes back.
+const STATE: &str = "nmt_state";
+const PRE_OPERATIONAL: &str = "pre-operational";
+
 const NAMES: [&str; 3] = ["vendor_id", "product_code", "revision_number"];
 
 fn from_table(file: &Table<'_>) -> Result<Journal, Problem> {
-    file.takes_only(&[&NAMES[..], &["node", "undo", "whole"]].concat())?;
+    file.takes_only(&[&NAMES[..], &["node", "undo", "whole", STATE]].concat())?;
     if !file.need("whole", "true at its end; it was not written to its end")?.flag("true")? {
         return Err(Problem::new(file.place(), "it was not written to its end"));
     }
@@ -75,8 +84,13 @@ fn from_table(file: &Table<'_>) -> Result<Journal, Problem> {
         product_code: number(NAMES[1])?,
         revision_number: number(NAMES[2])?,
     };
+    let pre_operational = match file.get(STATE) {
+        None => false,
+        Some(field) if field.text(PRE_OPERATIONAL)? == PRE_OPERATIONAL => true,
+        Some(field) => return Err(field.wrong(PRE_OPERATIONAL)),
+    };
     let undo = file.need("undo", EXPECTED)?.list(EXPECTED)?;
-    Ok(Journal { node: id, identity, undo: undo.iter().map(write).collect::<Result<_, _>>()? })
+    Ok(Journal { node: id, identity, pre_operational, undo: undo.iter().map(write).collect::<Result<_, _>>()? })
 }
 
 fn write(field: &Field<'_>) -> Result<(Mux, Vec<u8>), Problem> {
@@ -100,7 +114,7 @@ mod tests {
     fn journal() -> Journal {
         let identity = Identity { vendor_id: Some(0x100), ..Identity::default() };
         let undo = vec![(Mux::new(0x1800, 1), vec![0x84, 1, 0, 0x80]), (Mux::new(0x2000, 0), Vec::new())];
-        Journal { node: NodeId::new(4).expect("a node-ID"), identity, undo }
+        Journal { node: NodeId::new(4).expect("a node-ID"), identity, pre_operational: true, undo }
     }
 
     #[test]

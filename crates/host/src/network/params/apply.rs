@@ -134,7 +134,7 @@ impl Transaction {
             return Ok(Applied { writes: 0, rounded: Vec::new(), displaced: Vec::new() });
         }
         let path = self.journal.clone().unwrap_or_else(|| default_path(id));
-        let journal = || Journal { node: id, identity: plan.identity, undo: plan.undo() };
+        let journal = || Journal { node: id, identity: plan.identity, pre_operational: false, undo: plan.undo() };
         let kept = self.journal.as_deref().map(|path| Kept::create(path, &journal(), self.on_kept)).transpose()?;
         let done = |kept: Option<Kept>| kept.map_or(Ok(()), Kept::remove);
         let show = |number: usize, step: &master::parameters::ParameterStep| {

@@ -9,6 +9,7 @@ use master::Drive;
 use master::parameters::{Parameters, Undone, roll_back};
 use serde::Serialize;
 
+use super::pre_operational::{SeenBy, leave_operational};
 use super::source;
 use machine::parameters::journal::Journal;
 use words::document::read_text;
@@ -114,6 +115,12 @@ pub struct RollbackReport {
     pub journal: String,
     /// Objects that have again what they had.
     pub put_back: usize,
+    /// By what the node was seen to be pre-operational again; absent where it was not started.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nmt_back: Option<&'static str>,
+    /// The same in words.
+    #[serde(skip)]
+    pub nmt_back_in_words: Option<&'static str>,
 }
 
 /// Puts back what a node had before a transaction that was broken off.
@@ -131,8 +138,18 @@ pub async fn roll_back_by(path: &Path, drive: &Drive) -> Result<RollbackReport, 
     if !undone.not_put_back.is_empty() {
         return Err(not_put_back(node, &undone, path));
     }
+    let seen = match journal.pre_operational {
+        true => leave_operational(drive, None).await.ok(),
+        false => None,
+    };
     remove(path)?;
-    Ok(RollbackReport { node: node.raw(), journal: path.display().to_string(), put_back: undone.put_back })
+    Ok(RollbackReport {
+        node: node.raw(),
+        journal: path.display().to_string(),
+        put_back: undone.put_back,
+        nmt_back: seen.map(SeenBy::word),
+        nmt_back_in_words: seen.map(SeenBy::words),
+    })
 }
 
 /// That some objects have not what they had.

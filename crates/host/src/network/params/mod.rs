@@ -3,6 +3,7 @@
 mod apply;
 mod compare;
 pub mod journal;
+pub(crate) mod pre_operational;
 mod shown;
 pub mod source;
 
@@ -17,6 +18,7 @@ use serde::Serialize;
 pub(crate) use apply::refused as apply_refused;
 pub use apply::{ApplyReport, Proof, Rounded, Transaction};
 pub use compare::{Deviates, DiffReport, DiffRow, VerifyReport, diff_of_files, diff_of_node, verify_node};
+pub use pre_operational::SeenBy;
 pub use shown::{Shown, name};
 
 use super::Progress;

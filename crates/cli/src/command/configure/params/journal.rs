@@ -28,10 +28,9 @@ impl super::Rollback {
 
 impl Report for RollbackReport {
     fn text(&self, _: Paint) -> String {
-        {
-            let read = if self.put_back == 1 { "reads" } else { "read" };
-            let objects = counted(self.put_back, "object");
-            format!("node {}: {objects} {read} as before; {} is deleted", self.node, plain(&self.journal))
-        }
+        let read = if self.put_back == 1 { "reads" } else { "read" };
+        let objects = counted(self.put_back, "object");
+        let state = self.nmt_back_in_words.map(|words| format!("; {words}")).unwrap_or_default();
+        format!("node {}: {objects} {read} as before{state}; {} is deleted", self.node, plain(&self.journal))
     }
 }
