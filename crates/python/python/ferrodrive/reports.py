@@ -501,3 +501,4 @@ class RollbackReport(TypedDict):
     node: int
     journal: str
     put_back: int
+    nmt_back: Optional[str]

@@ -115,8 +115,7 @@ pub struct RollbackReport {
     pub journal: String,
     /// Objects that have again what they had.
     pub put_back: usize,
-    /// By what the node was seen to be pre-operational again; absent where it was not started.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// By what the node was seen to be pre-operational again; `None` where it was not started.
     pub nmt_back: Option<&'static str>,
     /// The same in words.
     #[serde(skip)]
