@@ -545,9 +545,8 @@ impl World {
         let mut decoder = Decoder::new();
         let numbers: Vec<u8> = state.world.drive_numbers().collect();
         for number in numbers {
-            let model = state.world.with_drive(number, |drive, _| drive.model()).map_err(refused)?;
-            // The model of a drive by its file is not known by its name.
-            if let (Some(node), Ok(model)) = (NodeId::new(number), words::models::resolve(model)) {
+            let model = state.world.with_drive(number, |drive, _| drive.description()).map_err(refused)?;
+            if let (Some(node), Some(model)) = (NodeId::new(number), model) {
                 decoder.set_model(node, model);
             }
         }

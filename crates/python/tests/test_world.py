@@ -463,6 +463,20 @@ def test_analogue_channels_are_there_by_their_objects():
     assert world.add("cia402", node=5).analogue == {}
 
 
+def test_the_pdos_of_a_drive_by_its_data_sheet_are_read_by_that(tmp_path):
+    sheet = tmp_path / "maker.eds"
+    sheet.write_text(ferrodrive.eds("cia402"))
+    world = ferrodrive.World()
+    world.add(eds=sheet, node=5)
+    world.wait_until_booted()
+    with ferrodrive.Network(world) as network:
+        network.nmt("start")
+        world.run_for(50)
+    # CiA 402-2, 7.1: the statusword is in TPDO1 as delivered.
+    said = [line for line in world.decoded_frames(20) if "TPDO1" in line]
+    assert said and all("6041h:00" in line for line in said), said
+
+
 def test_what_is_in_a_pdo_is_known_after_the_frames_that_mapped_it_have_left(world):
     with ferrodrive.Network(world) as network:
         network.boot()
