@@ -88,7 +88,8 @@ fn a_joint_is_not_asked_for_more_than_its_motor_does() {
         assert!(ended.status == Some(1) && ended.err.contains(&said), "{}", ended.err);
         let taken = bench.json(&["objects", "1", "60FF"]);
         assert_eq!(taken["objects"][0]["now"]["acts_up_to"], most, "{taken}");
-        bench.done(&["velocity", "1", &format!("{}rpm", most - 200), "--for", "100ms"]);
+        let turned = bench.done(&["velocity", "1", &format!("{}rpm", most - 200), "--for", "100ms"]).out;
+        assert!(turned.contains(&format!("limits  speed up to {most} r/min, acceleration")), "{turned}");
     }
 }
 

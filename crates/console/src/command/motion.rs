@@ -168,6 +168,9 @@ impl From<&Commanded> for SentCommand {
 #[derive(Debug, Default, Serialize)]
 struct ProfileLimits {
     profile_velocity_rpm: Option<f64>,
+    /// Where it turns at a speed: the highest that acts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_rpm: Option<f64>,
     acceleration_ms: Option<f64>,
     deceleration_ms: Option<f64>,
     quick_stop_ms: Option<f64>,
@@ -365,16 +368,22 @@ pub async fn outcome(
 /// What limits a motion, as far as the drive has objects for it.
 async fn limits(drive: &Drive) -> ProfileLimits {
     let Some(axis) = drive.axis_description() else { return ProfileLimits::default() };
-    if drive.mode().await.is_ok_and(|mode| mode == ModeOfOperation::PROFILE_TORQUE) {
+    let mode = drive.mode().await.ok();
+    if mode == Some(ModeOfOperation::PROFILE_TORQUE) {
         let limit = drive.current_limit().await.ok().flatten();
         let current_a = limit.map(|Amperes(current)| current);
         return ProfileLimits { current_a, is_torque: true, ..ProfileLimits::default() };
     }
-    let profile_velocity_rpm = match axis.units.profile_velocity {
-        Some(quantity) => drive.read_quantity(quantity).await.ok(),
-        None => None,
+    // The profile velocity is that of moves to a position.
+    let limits = match (mode, axis.units.profile_velocity, axis.units.target_velocity) {
+        (Some(ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::VELOCITY), _, Some(target)) => {
+            ProfileLimits { velocity_rpm: highest_rpm(drive, target).await, ..ProfileLimits::default() }
+        }
+        (_, Some(profile), _) => {
+            ProfileLimits { profile_velocity_rpm: drive.read_quantity(profile).await.ok(), ..ProfileLimits::default() }
+        }
+        _ => ProfileLimits::default(),
     };
-    let limits = ProfileLimits { profile_velocity_rpm, ..ProfileLimits::default() };
     let number = async |object, scale| drive.read_quantity(Quantity { object, scale }).await.ok();
     let ms = Scale::PerCount(1.0);
     match axis.units.ramps {
@@ -391,9 +400,19 @@ async fn limits(drive: &Drive) -> ProfileLimits {
     }
 }
 
+/// The highest target velocity that acts, in r/min of the output.
+async fn highest_rpm(drive: &Drive, target: Quantity) -> Option<f64> {
+    let limits = drive.limits(target.object).await.ok()?;
+    let most = limits.held_to.map_or(limits.high, |(most, _)| most.abs().min(limits.high));
+    // All that its type holds limits nothing.
+    let most = Some(most).filter(|most| *most < i64::from(i32::MAX))?;
+    Some(most as f64 * drive.step_of(target).await.ok()?)
+}
+
 impl ProfileLimits {
     fn text(&self) -> String {
         let parts = [
+            self.velocity_rpm.map(|rpm| format!("speed up to {} r/min", Shown(rpm))),
             self.profile_velocity_rpm.map(|rpm| format!("profile velocity {} r/min", Shown(rpm))),
             self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
             self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
