@@ -243,12 +243,9 @@ impl Wanted {
             let journal = Journal { node: node.id(), identity: steps.identity, pre_operational, undo: steps.undo() };
             let kept = self.journal.as_deref().map(|path| Kept::create(path, &journal, self.on_kept)).transpose()?;
             restorer.note_written(journal.undo, kept);
-            match drive.apply_tpdos(&steps).await.map_err(source::refused)? {
-                Ok(_) => {}
-                Err(error) => {
-                    let path = self.journal.clone().unwrap_or_else(|| default_path(node.id()));
-                    return Err(apply_refused(&error, drive.description(), &path));
-                }
+            if let Err(error) = drive.apply_tpdos(&steps).await.map_err(source::refused)? {
+                let path = self.journal.clone().unwrap_or_else(|| default_path(node.id()));
+                return Err(apply_refused(&error, drive.description(), &path));
             }
         }
         if plan.pace == super::plan::Pace::OwnSync {

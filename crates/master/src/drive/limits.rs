@@ -102,7 +102,7 @@ impl Drive {
     }
 
     /// Refuses a position beyond the software limits (CiA 402-2, 607Dh), to which a drive does not go, before anything moves. Limits the
-    /// wrong way round are none, and a model without them has none.
+    /// wrong way round have no effect, and a model without them goes anywhere.
     ///
     /// # Errors
     /// [`Error::OutOfLimits`]; those of the SDO reads.

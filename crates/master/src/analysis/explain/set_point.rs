@@ -234,7 +234,7 @@ fn software_limit(seen: &Observed) -> Option<Finding> {
     })
 }
 
-/// The drive stands at the end of 607Dh to which it is asked to turn: this is no load.
+/// The drive stands at the end of 607Dh to which it is asked to turn: no load holds it.
 fn at_software_limit(seen: &Observed, heading: f64) -> Option<Finding> {
     let (low, high) = (seen.axis_value(MIN_POSITION_LIMIT)?, seen.axis_value(MAX_POSITION_LIMIT)?);
     let at = seen.axis_value(POSITION_ACTUAL_VALUE)?;

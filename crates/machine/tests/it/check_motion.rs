@@ -1,0 +1,148 @@
+//! `check`: groups and bases of a machine file, held against what their drives do.
+
+use std::path::Path;
+
+use machine::check::{Finding, Place, Severity, of_machine};
+
+/// The ZLAC8030L does 1000 r/min (60FFh, object table of its manual), or what 6080h is set to.
+#[test]
+fn what_a_group_states_and_its_drives_do_not_do_or_do_not_know_is_said() {
+    let text = |limits: &str, units: &str, axis: &str, more: &str| {
+        format!(
+            "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n{limits}{units}[[group]]\nname = \"arm\"\nperiod = \"10ms\"\n[[group.axis]]\n\
+             node = 4\n{axis}acceleration_deg_s2 = 600\njerk_deg_s3 = 6000\nfollowing_error_deg = 20\n{more}"
+        )
+    };
+    let by_rule = |text: &str, rule: &str| -> Vec<Finding> {
+        let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        all.into_iter().filter(|finding| finding.rule == rule).collect()
+    };
+    let found = |text: &str| by_rule(text, "group-limits");
+    assert_eq!(found(&text("", "", "velocity_deg_s = 6000\n", "")), []);
+    // Its modes are those for profiles: position, velocity, torque.
+    for (mode, missing) in [("csp", true), ("pv", false)] {
+        let said = by_rule(&text("", "", &format!("mode = \"{mode}\"\nvelocity_deg_s = 60\n"), ""), "group-mode");
+        assert_eq!(said.len(), usize::from(missing), "{said:?}");
+        assert!(
+            said.iter().all(|said| said.severity == Severity::Error && said.next.contains("profile velocity")),
+            "{said:?}"
+        );
+    }
+    // 6001 deg/s are 1000.17 r/min; behind a gear of 10 the output does a tenth.
+    for (units, speed, most) in
+        [("", "6001", "6000 deg/s (1000 r/min)"), ("units = { gear_ratio = 10 }\n", "601", "600 deg/s (100 r/min)")]
+    {
+        let said = found(&text("", units, &format!("velocity_deg_s = {speed}\n"), ""));
+        assert_eq!((said.len(), said[0].severity, said[0].node), (1, Severity::Warning, Some(4)), "{said:?}");
+        assert!(said[0].what.contains(most) && said[0].next.contains("lower its `velocity_deg_s`"), "{said:?}");
+    }
+    // "M Robot Joint Motor CanOpen Manual", Parameters: the motor of the M8025 does 1500 r/min, and 60FFh takes 3000.
+    for (speed, is_said) in [("9000", false), ("9006", true)] {
+        let joint = text("", "", &format!("velocity_deg_s = {speed}\n"), "").replace("zlac8030l", "m8025e25b50");
+        let said = found(&joint);
+        assert_eq!(said.len(), usize::from(is_said), "{said:?}");
+        assert!(
+            said.iter().all(|said| said.what.contains("(1500 r/min) at most by the highest speed of its motor")),
+            "{said:?}"
+        );
+    }
+    let range = "range_deg = [-90, 45.5]\nvelocity_deg_s = 60\n";
+    let said = found(&text("", "", range, ""));
+    assert_eq!((said.len(), said[0].severity), (1, Severity::Note), "{said:?}");
+    assert!(
+        said[0].what.contains("`range_deg = [-90, 45.5]` binds the group 'arm' alone: `ferrodrive move 4`"),
+        "{said:?}"
+    );
+    let other = "[[group]]\nname = \"two\"\n[[group.axis]]\nnode = 4\nvelocity_deg_s = 61\nacceleration_deg_s2 = 600\njerk_deg_s3 = 6000\n\
+                 following_error_deg = 20\n";
+    let said = found(&text("", "", "velocity_deg_s = 60\n", other));
+    assert_eq!((said.len(), said[0].at.line), (1, 13), "{said:?}");
+    assert!(said[0].what.contains("the groups 'arm' and 'two' state other limits"), "{said:?}");
+}
+
+#[test]
+fn wheels_of_an_unlikely_size_are_named_where_the_file_says_it() {
+    // Lines 1 to 6 are the drives.
+    let drives = "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n[[drive]]\nmodel = \"zlac8030l\"\nnode = 5\n";
+    let body =
+        "[[body]]\nname = \"b\"\nkind = \"differential-drive\"\ndrives = [4, 5]\nmass_kg = 30\nwheel_base_m = 0.5\n";
+    let base = "[base]\nwheels = [4, 5]\nturns = [1, -1]\nwheel_base_m = 0.5\nlinear_m_s = 0.5\nangular_rad_s = 1\n\
+                wheel_m_s = 0.9\nwheel_m_s2 = 0.7\n";
+    for (table, line, radius, named) in [
+        (body, 13, "86.5", true),
+        (body, 13, "2.1", true),
+        (body, 13, "0.004", true),
+        (body, 13, "0.0865", false),
+        (body, 13, "2", false),
+        (base, 15, "84", true),
+        (base, 15, "0.084", false),
+    ] {
+        let text = format!("{drives}{table}wheel_radius_m = {radius}\n");
+        let checked = of_machine(&text, std::path::Path::new(".")).unwrap_or_else(|bad| panic!("{text}{bad}"));
+        let found: Vec<_> = checked.findings.iter().filter(|finding| finding.rule == "wheel-radius").collect();
+        assert_eq!(!found.is_empty(), named, "{text}: {found:?}");
+        for finding in found {
+            assert_eq!(
+                (finding.severity, finding.at, finding.node),
+                (Severity::Note, Place { line, column: 18 }, None)
+            );
+            assert!(finding.what.contains(&format!("{radius} m")) && finding.next.contains("86.5 mm"), "{finding:?}");
+        }
+    }
+}
+
+/// 60FFh of the ZLAC8030L: -1000 to 1000 r/min, in whole r/min by 202Fh:05 as delivered (object table of its manual). A wheel of 84 mm
+/// goes 2 pi 0.084 / 60 = 0.0088 m/s at 1 r/min.
+#[test]
+fn a_base_is_held_against_its_drives_and_against_the_body_that_they_move() {
+    let text = |wheel_m_s: &str, start_up: &str, body: &str| {
+        format!(
+            "[[drive]]\nmodel = \"zlac8030l\"\nnode = 4\n{start_up}[[drive]]\nmodel = \"zlac8030l\"\nnode = 5\n{start_up}{body}[base]\n\
+             wheels = [4, 5]\nturns = [1, -1]\nwheel_base_m = 0.5\nwheel_radius_m = 0.084\nlinear_m_s = 0.5\nangular_rad_s = 1\n\
+             wheel_m_s = {wheel_m_s}\nwheel_m_s2 = 0.7\n"
+        )
+    };
+    let found = |text: &str, rule: &str| -> Vec<Finding> {
+        let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        all.into_iter().filter(|finding| finding.rule == rule).collect()
+    };
+    let fast = found(&text("9", "", ""), "base-limits");
+    assert_eq!(
+        fast.iter().map(|one| (one.severity, one.node)).collect::<Vec<_>>(),
+        [4, 5].map(|node| (Severity::Warning, Some(node)))
+    );
+    assert!(fast[0].what.contains("1000 r/min (8.796") && fast[0].next.contains("`wheel_m_s` to 8.796"), "{fast:?}");
+    assert_eq!(found(&text("8.79", "", ""), "base-limits"), []);
+
+    let finer = "start_up = { '202F:05' = 10 }\n";
+    let coarse = found(&text("0.9", "", ""), "base-steps");
+    assert_eq!(
+        coarse.iter().map(|one| (one.severity, one.node)).collect::<Vec<_>>(),
+        [4, 5].map(|node| (Severity::Note, Some(node)))
+    );
+    assert!(
+        coarse[0].what.contains("0.004398")
+            && coarse[0].what.contains("0.01759")
+            && coarse[0].next.contains("write 10 to 202Fh:05"),
+        "{coarse:?}"
+    );
+    assert_eq!(found(&text("0.9", finer, ""), "base-steps"), []);
+
+    let body = |drives: &str, radius: &str, turns: &str| {
+        format!(
+            "[[body]]\nname = \"cart\"\nkind = \"differential-drive\"\ndrives = {drives}\nturns = {turns}\nmass_kg = 30\nwheel_base_m = 0.5\n\
+             wheel_radius_m = {radius}\n"
+        )
+    };
+    let said =
+        |drives: &str, radius: &str, turns: &str| found(&text("0.9", "", &body(drives, radius, turns)), "base-body");
+    assert_eq!(said("[4, 5]", "0.084", "[1, -1]"), []);
+    for (drives, radius, turns, part) in [
+        ("[4, 5]", "0.085", "[1, -1]", "`wheel_radius_m` is 0.084 in [base] and 0.085 in the body 'cart'"),
+        ("[5, 4]", "0.084", "[-1, 1]", "the left wheel of [base] is the right one of the body 'cart'"),
+        ("[4, 5]", "0.084", "[1, 1]", "a wheel that is to go 1 m goes -1 m"),
+    ] {
+        let all = said(drives, radius, turns);
+        assert!(all.len() == 1 && all[0].severity == Severity::Warning && all[0].what.contains(part), "{all:?}");
+    }
+}
