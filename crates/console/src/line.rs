@@ -84,6 +84,10 @@ impl host::console::Reader for Reader {
                 return Err(Said::senseless(text.to_owned()));
             }
             CommandEffect::OnDrive(node, command) => Some(NodeCommand::from(command).to(node)),
+            CommandEffect::OnEveryDrive => {
+                let text = "error: a page enables, disables and resets drives one at a time\n  next:    name the node, e.g. enable 4; estop stops all";
+                return Err(Said::senseless(text.to_owned()));
+            }
             CommandEffect::StopAll => Some(Asked::STOP_ALL),
             CommandEffect::StopAllByRamp => {
                 let text = "error: a page does not stop all drives by their ramps\n  next:    estop stops them at once; stop NODE one of them by its ramp";
@@ -170,9 +174,8 @@ fn parser() -> clap::Command {
     CommandLine::command().mut_subcommands(|command| {
         let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let mut lines: Vec<String> = Vec::new();
-        for line in examples
-            .lines()
-            .filter(|line| ![" -v ", "stop all", "--model ", "--from "].iter().any(|of| line.contains(of)))
+        for line in
+            examples.lines().filter(|line| ![" -v ", " all", "--model ", "--from "].iter().any(|of| line.contains(of)))
         {
             let line = [" --bus can0", " --machine machine.toml", " --json"]
                 .iter()

@@ -18,4 +18,5 @@ mod params;
 mod records;
 mod report;
 mod servers;
+mod several;
 mod virtual_bus;

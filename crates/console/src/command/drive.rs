@@ -1,7 +1,7 @@
 //! `ferrodrive state`, `enable`, `disable`, `stop`, `quick-stop` and `reset`: the power state machine of CiA 402 by its
 //! intents, and what a drive says of itself.
 
-use canopen::{NmtState, NodeId};
+use canopen::NmtState;
 use cia402::{ModeOfOperation, PowerState};
 use master::Gear;
 use master::drive::{Drive, DriveState};
@@ -11,9 +11,9 @@ use super::estop::{Estop, StopReport, stop_all};
 use crate::context::Context;
 use crate::failure::Failure;
 use plot::Paint;
-use words::node::{Nodes, node, nodes};
+use words::node::{Nodes, nodes};
 
-/// Show the state of a drive: power state, fault, position, speed, current, supply
+/// Show the state of a drive, or of all: power state, fault, position, speed, current, supply
 ///
 /// Reads only. A fault is shown with its remedy. What a drive has no object for is omitted. `explain` shows why it does
 /// not move, `watch` shows objects as they change.
@@ -22,34 +22,35 @@ use words::node::{Nodes, node, nodes};
     after_help = "Examples:\n  ferrodrive state 4\n  ferrodrive --bus can0 --machine machine.toml state 4 --json"
 )]
 pub struct State {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    pub(super) node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    pub(super) nodes: Nodes,
 }
 
-/// Enable a drive: power its motor, which holds still
+/// Enable a drive, or all: power its motor, which holds still
 ///
 /// Takes the transitions of CiA 402 to operation enabled, whatever state the drive is in; a fault is not reset. The
 /// drive stays enabled when the command has ended.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it"
+    after_help = "Examples:\n  ferrodrive --bus can0 enable 4\n  ferrodrive --bus can0 enable 4 -v      # each frame of it\n  \
+                  ferrodrive --bus can0 enable all"
 )]
 pub struct Enable {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    pub(super) node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    pub(super) nodes: Nodes,
 }
 
-/// Disable a drive: stop it, then remove power from its motor
+/// Disable a drive, or all: stop it, then remove power from its motor
 ///
 /// A load that pulls (an arm, a slope) moves a motor without power, unless a brake holds it.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  ferrodrive --bus can0 disable 4")]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 disable 4\n  ferrodrive --bus can0 disable all")]
 pub struct Disable {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    pub(super) node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    pub(super) nodes: Nodes,
 }
 
 /// Stop a drive, or all, with the deceleration ramp; it stays enabled
@@ -111,17 +112,16 @@ impl StopOutcome {
     }
 }
 
-/// Reset a drive's fault, once its cause is gone
+/// Reset the fault of a drive, or of all, once its cause is gone
 ///
 /// A fault that persists is reported with its cause and remedy. The drive is not enabled.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 state 4          # the fault, and what to do about it"
-)]
+#[command(after_help = "Examples:\n  ferrodrive --bus can0 reset 4\n  ferrodrive --bus can0 reset all\n  \
+                  ferrodrive --bus can0 state 4          # the fault, and what to do about it")]
 pub struct Reset {
-    /// Node-ID
-    #[arg(value_parser = node)]
-    pub(super) node: NodeId,
+    /// Node-ID, or all
+    #[arg(value_name = "NODE|all", value_parser = nodes)]
+    pub(super) nodes: Nodes,
 }
 
 /// What a drive says of itself.
@@ -190,31 +190,6 @@ struct FaultReport {
     remedy: &'static str,
 }
 
-impl State {
-    /// Reads everything.
-    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        StateReport::read(&context.drive(self.node).await?).await
-    }
-}
-
-impl Enable {
-    /// Enables and shows the state.
-    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive(self.node).await?;
-        drive.enable().await?;
-        StateReport::read(&drive).await?.still_enabled()
-    }
-}
-
-impl Disable {
-    /// Disables and shows the state.
-    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive_to_stop(self.node).await?;
-        drive.disable().await?;
-        StateReport::read(&drive).await
-    }
-}
-
 impl Stop {
     /// Stops and shows the state.
     pub async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
@@ -233,15 +208,6 @@ impl QuickStop {
         let drive = context.drive_to_stop(node).await?;
         drive.quick_stop().await?;
         Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
-    }
-}
-
-impl Reset {
-    /// Resets and shows the state.
-    pub async fn run(&self, context: &Context) -> Result<StateReport, Failure> {
-        let drive = context.drive(self.node).await?;
-        drive.reset_fault().await?;
-        StateReport::read(&drive).await
     }
 }
 
@@ -289,7 +255,7 @@ impl StateReport {
     }
 
     /// A drive that was enabled and is no longer when it is looked at has not been left enabled.
-    fn still_enabled(self) -> Result<Self, Failure> {
+    pub(super) fn still_enabled(self) -> Result<Self, Failure> {
         if self.is_enabled {
             return Ok(self);
         }

@@ -19,6 +19,8 @@ pub enum CommandEffect {
     Manages(NodeId, NmtChange),
     /// It resets or stops nodes, or commands all of them, by NMT.
     ManagesMore,
+    /// It commands every drive, other than to stop.
+    OnEveryDrive,
     /// It stops every drive at once.
     StopAll,
     /// It stops every drive by its ramp.

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use canopen::NodeId;
-use cia402::object::STATUSWORD;
 use devices::AxisId;
 use master::drive::{Drive, StopWay, StoppedAxis};
-use master::{Error, join_all};
+use master::join_all;
 use serde::Serialize;
 
+use super::on_bus::drives_on_bus;
 use crate::context::Context;
 use crate::failure::Failure;
 use plot::Paint;
@@ -59,9 +59,6 @@ struct AxisReport {
 /// By what a drive that `stop all` has stopped is held.
 const RAMP: &str = "ramp";
 
-/// How long a node is given to say whether it is a drive.
-const PATIENCE: Duration = Duration::from_millis(150);
-
 impl Estop {
     /// Stops everything.
     pub async fn run(&self, context: &Context) -> Result<StopReport, Failure> {
@@ -87,18 +84,7 @@ impl Estop {
 
 /// `stop all`: each by its ramp; it stays enabled.
 pub async fn stop_all(context: &Context) -> Result<StopReport, Failure> {
-    let asked = NodeId::all().map(|id| async move {
-        let node = context.network.node(id).with_timeout(PATIENCE).by_server_in_use();
-        let answer = node.read::<u16>(STATUSWORD).await;
-        let expected = context.stated_model(id).is_some() || context.network.facts(id).seen_at.is_some();
-        match answer {
-            Ok(_) => Some((id, None)),
-            Err(Error::NoAnswer { .. }) if !expected => None,
-            Err(Error::Aborted { code: canopen::AbortCode::NO_SUCH_OBJECT, .. }) => None,
-            Err(error) => Some((id, Some(error))),
-        }
-    });
-    let found = join_all(asked.collect::<Vec<_>>()).await.into_iter().flatten();
+    let found = drives_on_bus(context).await.into_iter();
     let stops = found.map(|(id, silent)| async move {
         let silent = silent.map(Failure::from);
         let drive = match silent {

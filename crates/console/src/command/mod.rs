@@ -8,8 +8,10 @@ pub mod home;
 pub mod motion;
 pub mod nmt;
 pub mod object;
+mod on_bus;
 pub mod read;
 pub mod scan;
+pub mod several;
 pub mod store;
 pub mod write;
 
@@ -23,10 +25,11 @@ use words::node::Nodes;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
-use drive::{StateReport, StopOutcome};
+use drive::StopOutcome;
 pub use effect::CommandEffect;
 use motion::MotionOutcome;
 use object::ObjectReport;
+use several::StateOutcome;
 
 /// Commands on a bus.
 #[derive(Debug, Subcommand)]
@@ -74,7 +77,7 @@ pub enum Outcome {
     /// An object that was written.
     Written(Box<ObjectReport>),
     /// What a drive says of itself.
-    State(Box<StateReport>),
+    State(StateOutcome),
     /// Why it does not move.
     Explained(Box<explain::Explanation>),
     /// Of a stop.
@@ -96,14 +99,14 @@ impl Command {
         Ok(match self {
             Self::Scan(command) => Outcome::Scanned(Box::new(command.run(context).await?)),
             Self::Write(command) => Outcome::Written(Box::new(command.run(context).await?)),
-            Self::State(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::State(command) => Outcome::State(command.run(context).await?),
             Self::Explain(command) => Outcome::Explained(Box::new(command.run(context).await?)),
-            Self::Enable(command) => Outcome::State(Box::new(command.run(context).await?)),
-            Self::Disable(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Enable(command) => Outcome::State(command.run(context).await?),
+            Self::Disable(command) => Outcome::State(command.run(context).await?),
             Self::Estop(command) => Outcome::Stopped(StopOutcome::all(command.run(context).await?)),
             Self::Stop(command) => Outcome::Stopped(command.run(context).await?),
             Self::QuickStop(command) => Outcome::Stopped(command.run(context).await?),
-            Self::Reset(command) => Outcome::State(Box::new(command.run(context).await?)),
+            Self::Reset(command) => Outcome::State(command.run(context).await?),
             Self::Velocity(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Move(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Torque(command) => Outcome::Moved(Box::new(command.run(context).await?)),
@@ -131,12 +134,12 @@ impl Command {
         match self {
             Self::Scan(_) | Self::State(_) | Self::Explain(_) => CommandEffect::None,
             Self::Write(command) => command.effect(),
-            Self::Enable(command) => CommandEffect::OnDrive(command.node, Of::Enable),
-            Self::Disable(command) => CommandEffect::OnDrive(command.node, Of::Disable),
-            Self::Reset(command) => CommandEffect::OnDrive(command.node, Of::ResetFault),
+            Self::Enable(command) => of_nodes(command.nodes, Of::Enable, CommandEffect::OnEveryDrive),
+            Self::Disable(command) => of_nodes(command.nodes, Of::Disable, CommandEffect::OnEveryDrive),
+            Self::Reset(command) => of_nodes(command.nodes, Of::ResetFault, CommandEffect::OnEveryDrive),
             Self::Estop(_) => CommandEffect::StopAll,
-            Self::Stop(command) => stop_of(command.nodes, Of::Stop, CommandEffect::StopAllByRamp),
-            Self::QuickStop(command) => stop_of(command.nodes, Of::QuickStop, CommandEffect::StopAll),
+            Self::Stop(command) => of_nodes(command.nodes, Of::Stop, CommandEffect::StopAllByRamp),
+            Self::QuickStop(command) => of_nodes(command.nodes, Of::QuickStop, CommandEffect::StopAll),
             Self::Velocity(command) => moves((command.node, command.motion())),
             Self::Move(command) => moves((command.node, command.motion())),
             Self::Torque(command) => moves((command.node, command.motion())),
@@ -149,9 +152,9 @@ impl Command {
     }
 }
 
-fn stop_of(nodes: Nodes, stop: master_drive::Command, all: CommandEffect) -> CommandEffect {
+fn of_nodes(nodes: Nodes, one: master_drive::Command, all: CommandEffect) -> CommandEffect {
     match nodes {
-        Nodes::One(node) => CommandEffect::OnDrive(node, stop),
+        Nodes::One(node) => CommandEffect::OnDrive(node, one),
         Nodes::All => all,
     }
 }
@@ -161,13 +164,9 @@ impl Outcome {
     pub fn failure(&self) -> Option<Failure> {
         match self {
             Self::Stopped(outcome) => outcome.failure(),
+            Self::State(outcome) => outcome.failure(),
             Self::Explained(explanation) => explanation.failure(),
-            Self::Scanned(_)
-            | Self::Written(_)
-            | Self::State(_)
-            | Self::Moved(_)
-            | Self::Stored(_)
-            | Self::Managed(_) => None,
+            Self::Scanned(_) | Self::Written(_) | Self::Moved(_) | Self::Stored(_) | Self::Managed(_) => None,
         }
     }
 }

@@ -31,6 +31,8 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["quick-stop", "all"], "stop_all"),
     (&["stop", "all"], "stop_all"),
     (&["reset", "4"], "state"),
+    (&["state", "all"], "states"),
+    (&["reset", "all"], "states"),
     (&["velocity", "4", "60rpm", "--for", "200ms"], "motion"),
     (&["move", "4", "90deg"], "motion"),
     (&["torque", "4", "500mA"], "motion"),
