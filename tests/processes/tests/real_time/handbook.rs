@@ -104,7 +104,8 @@ const DOCS_NOT_FOLLOWED: [(&str, &str); 4] = [
 ];
 
 /// The pages whose commands are run here, and how many they are.
-const FOLLOWED: [(&str, usize); 17] = [
+const FOLLOWED: [(&str, usize); 18] = [
+    ("another-maker.md", 8),
     ("install.md", 2),
     ("first-steps.md", 18),
     ("simulate.md", 14),
@@ -195,6 +196,12 @@ fn every_command_of_the_page_on_testing_ends_well() {
 fn every_command_of_the_page_on_logs_ends_well() {
     let folder = scratch("handbook_logs");
     follows("logs.md", follow_in("logs.md", &folder));
+}
+
+#[test]
+fn every_command_of_the_page_on_other_makers_ends_well() {
+    let folder = scratch("handbook_maker");
+    follows("another-maker.md", follow_in("another-maker.md", &folder));
 }
 
 #[test]
