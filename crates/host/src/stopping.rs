@@ -90,7 +90,7 @@ impl Account {
                 node,
                 stands: true,
                 because: vec![format!(
-                    "node {node} was moving and has been quick-stopped: it was seen to stand after {:.2} s",
+                    "node {node} was set in motion and has been quick-stopped: it was seen to stand after {:.2} s",
                     after.as_secs_f64()
                 )],
             },

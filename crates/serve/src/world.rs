@@ -39,8 +39,8 @@ pub struct ServedWorld {
     world: World,
     adapter: StationId,
     round_robin: RoundRobin<ClientId>,
-    /// Whose frame the adapter has.
-    offered: Option<ClientId>,
+    /// Whose frame the adapter has, and how many it had sent before.
+    offered: Option<(ClientId, Frame, u64)>,
     /// When the adapter takes another.
     free_at: Instant,
     heard: VecDeque<Heard>,
@@ -337,9 +337,11 @@ impl ServedWorld {
                 self.heard.push_back(Heard::Error { error: error_frame(cause), at });
             }
             let WireEvent::Frame { end, source, frame, .. } = event else { continue };
-            let mut from = None;
-            if source == self.adapter.index() {
-                from = self.offered.take();
+            // A drive may have sent the very same frame with it, and is the sender then.
+            let sent = self.world.frames_sent(self.adapter);
+            let is_offered = |offered: &mut (_, Frame, u64)| offered.1 == frame && sent > offered.2;
+            let from = self.offered.take_if(is_offered).map(|(client, ..)| client);
+            if from.is_some() || source == self.adapter.index() {
                 self.free_at = end.plus_nanos(u64::from(INTERFRAME_SPACE_BITS) * self.world.bitrate().bit_nanos());
             }
             if from.is_some() || self.hears() {
@@ -441,14 +443,15 @@ impl ServedWorld {
     /// Gives the adapter the next frame, if it takes one now.
     fn offer_next(&mut self) {
         if self.world.is_gone(self.adapter)
-            && let Some(from) = self.offered.take()
+            && let Some((from, ..)) = self.offered.take()
         {
             self.heard.push_back(Heard::Lost { from });
         }
         while self.offered.is_none() && self.free_at <= self.world.now() {
             let Some((client, frame)) = self.round_robin.pop() else { return };
+            let sent = self.world.frames_sent(self.adapter);
             match self.world.send(self.adapter, frame) {
-                Ok(()) => self.offered = Some(client),
+                Ok(()) => self.offered = Some((client, frame, sent)),
                 Err(_) => self.heard.push_back(Heard::Lost { from: client }),
             }
         }

@@ -217,6 +217,12 @@ impl World {
         }
     }
 
+    /// How many frames of a probe have got through: also one that another station has sent with it at the same time, the same to the last
+    /// bit, of which the wire has one frame and the log one sender.
+    pub fn frames_sent(&self, probe: StationId) -> u64 {
+        if let Member::Probe(probe) = &self.members[probe.0] { probe.sent() } else { 0 }
+    }
+
     /// True if a probe has heard a frame that has not been taken yet.
     pub fn has_received(&self, probe: StationId) -> bool {
         matches!(&self.members[probe.0], Member::Probe(probe) if probe.has_received())

@@ -13,6 +13,7 @@ mod looks;
 mod lss;
 mod machines;
 mod models;
+mod motion_ends;
 mod pages;
 mod params;
 mod records;

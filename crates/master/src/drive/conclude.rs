@@ -151,7 +151,8 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         ),
         Trigger::NoAcknowledge => text(
             "The drive did not acknowledge the set-point (statusword bit 12)",
-            "An earlier set-point may still be waiting to be run: stop the drive, then move again",
+            "A limit switch or an emergency stop input may be active, or an earlier set-point be waiting to be run: ferrodrive explain \
+             names an input; move away from a limit the other way, or stop the drive, then move again",
         ),
         Trigger::NoProfileVelocity(object) => no_profile_velocity(object),
         Trigger::TooSlow { object, rpm, limit } => too_slow(object, *rpm, *limit),

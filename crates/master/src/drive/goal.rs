@@ -164,13 +164,15 @@ impl Drive {
 
     /// Polls a drive that is to keep its speed for `duration`.
     pub(super) async fn watch_speed(&self, intent: &'static str, held: Held, duration: Duration) -> Result<(), Error> {
-        let (mut waited, mut lost) = (Duration::ZERO, 0);
+        // By the clock: looks take time as well, and a program that was frozen is late already.
+        let (network, end) = (self.node.network(), self.node.network().now() + duration);
+        let mut lost = 0;
         let mut goal = Goal::Speed(held);
-        while waited < duration {
+        loop {
             let statusword = self.still_enabled(intent).await?;
             let look = self.answered(intent, goal.look(self, intent, statusword, None).await).await?;
             lost = if look.reached { 0 } else { lost + 1 };
-            let last = waited + POLL >= duration;
+            let last = network.now() >= end;
             if lost >= LOOKS_AT_REST && (last || lost % LOOKS_AT_REST == 0) {
                 self.find_who_stopped_it(intent, &goal, look.at).await?;
                 if last || look.rests {
@@ -179,9 +181,11 @@ impl Drive {
                     return Err(self.not_reached(intent, elsewhere).await);
                 }
             }
-            self.wait_poll(&mut waited).await;
+            if last {
+                return Ok(());
+            }
+            network.sleep(POLL.min(end - network.now())).await;
         }
-        Ok(())
     }
 
     /// Waits until a shaft that has reached its target stands there. Bit 10 comes when the shaft is in its window, which it may

@@ -209,7 +209,7 @@ impl Network {
 
     /// Ends the guards of those of these drives that this program has not set in motion, or has seen to stand since, as
     /// [`Drive::release_guard`] does. A drive that may still be moving keeps its watch over its host, and is no longer kept
-    /// content: it stops by itself.
+    /// content: it stops by itself. The others have their ramps back, where a group or a base had set them for its cycles.
     ///
     /// # Errors
     /// The first error of an SDO request; those guards have ended nevertheless.
@@ -222,7 +222,18 @@ impl Network {
         }
         let at_rest = nodes.iter().filter(|node| !moved.contains(*node));
         let released = join_all(at_rest.map(|node| self.release_guard(node, moved)).collect::<Vec<_>>()).await;
-        released.into_iter().collect()
+        let put_back = NodeId::all().filter(|node| of.contains(*node) && !moved.contains(*node));
+        let put_back = join_all(put_back.map(|node| self.put_back(node)).collect::<Vec<_>>()).await;
+        released.into_iter().chain(put_back).collect()
+    }
+
+    /// Writes what was noted of a node's objects.
+    async fn put_back(&self, id: NodeId) -> Result<(), Error> {
+        let node = self.node(id).by_server_in_use();
+        for (object, value) in self.take_former(id) {
+            node.download(object, value.as_bytes()).await?;
+        }
+        Ok(())
     }
 
     /// Stops, on all nodes but `own`, what the first heartbeat of `host` would set going again: a drive that has stopped for want of it

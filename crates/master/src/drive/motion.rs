@@ -7,7 +7,7 @@ use cia402::object::CONTROLWORD;
 use cia402::{Controlword, ModeOfOperation, PowerState};
 
 use super::goal::{Goal, Held, Sent};
-use super::handle::Drive;
+use super::handle::{Drive, POLL};
 use super::scale::{Commanded, REACHED_LEAST_RPM};
 use crate::error::Error;
 use crate::host_loss::HostLoss;
@@ -193,10 +193,11 @@ impl Drive {
             let rpm = self.answered(INTENT, self.read_quantity(target).await).await?;
             return self.watch_speed(INTENT, self.held(rpm, Sent { object: target.object, raw })?, duration).await;
         }
-        let mut waited = Duration::ZERO;
-        while waited < duration {
+        // By the clock: looks take time as well, and a program that was frozen is late already.
+        let (network, end) = (self.node.network(), self.node.network().now() + duration);
+        while network.now() < end {
             self.still_enabled(INTENT).await?;
-            self.wait_poll(&mut waited).await;
+            network.sleep(POLL.min(end - network.now())).await;
         }
         Ok(())
     }

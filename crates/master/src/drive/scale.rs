@@ -252,12 +252,23 @@ impl Drive {
 
     /// Sets ramps that follow a new speed in every cycle: drives with times take this period for each change, drives with rates
     /// twice the acceleration that the speeds have. The program makes the ramps then; a stop of the drive's own by its
-    /// profile deceleration (6084h) becomes as hard as its current allows.
+    /// profile deceleration (6084h) becomes as hard as its current allows. What the objects had is put back when the drive stands and
+    /// its guard is given back ([`Network::release_guards`](crate::Network::release_guards)).
     pub(crate) async fn write_ramps_of_a_cycle(&self, period: Duration, rpm_per_s: f64) -> Result<(), Error> {
         let ramp = match self.ramps("follow a speed in each cycle")? {
             Ramps::Times { .. } => Ramp::Time(period),
             Ramps::Rates { .. } => Ramp::RpmPerSecond(2.0 * rpm_per_s),
         };
+        let objects = match self.ramps("follow a speed in each cycle")? {
+            Ramps::Times { acceleration, deceleration, .. } => vec![acceleration, deceleration],
+            Ramps::Rates { acceleration, deceleration, scale: Scale::InTime { .. }, .. } => {
+                [acceleration, deceleration].into_iter().flat_map(|change| [change, time_of(change)]).collect()
+            }
+            Ramps::Rates { acceleration, deceleration, .. } => vec![acceleration, deceleration],
+        };
+        for object in objects {
+            self.node.network().note_former(self.node.id(), object, self.node.upload(object).await?);
+        }
         // The change does not matter to either, but for being one.
         self.write_ramps(Some(ramp), Some(ramp), self.gear.at_output(1.0)).await.map(|_| ())
     }

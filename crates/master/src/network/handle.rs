@@ -9,7 +9,7 @@ use canopen::{Mux, NmtCommand, NodeId, sync};
 use devices::AxisId;
 
 use super::moved::{Moved, MovedAxis};
-use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Received, SdoServer, Ticket};
+use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Payload, Received, SdoServer, Ticket};
 use crate::host_loss::ArmedGuard;
 use crate::models::Models;
 
@@ -44,6 +44,8 @@ pub(super) struct NetworkState {
     models: Models,
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, ArmedGuard>,
+    /// What objects had that are changed for a motion alone.
+    former: BTreeMap<NodeId, BTreeMap<Mux, Payload>>,
     /// SDO servers that nodes are to be asked by, whose records are still to be read.
     chosen_servers: BTreeMap<NodeId, u16>,
     /// How often another server was chosen for a node: what was read for an earlier choice overrules no later one.
@@ -275,6 +277,17 @@ impl Network {
     /// The guards of this program, to look at or to change.
     pub(crate) fn with_guards<T>(&self, look: impl FnOnce(&mut BTreeMap<NodeId, ArmedGuard>) -> T) -> T {
         look(&mut self.lock().guards)
+    }
+
+    /// An object of a node is going to be changed for a motion alone; what it has now is put back when the node's guard is given back. Of
+    /// an object that has been noted the first value counts.
+    pub(crate) fn note_former(&self, node: NodeId, object: Mux, value: Payload) {
+        self.lock().former.entry(node).or_default().entry(object).or_insert(value);
+    }
+
+    /// What was noted of a node, which is no longer noted.
+    pub(crate) fn take_former(&self, node: NodeId) -> BTreeMap<Mux, Payload> {
+        self.lock().former.remove(&node).unwrap_or_default()
     }
 
     pub(crate) fn submit(&self, command: Command) {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::support::node;
 use can::{Bitrate, Instant};
+use canopen::Mux;
 use cia402::ModeOfOperation;
 use devices::Description;
 use devices::servo::CIA402;
@@ -395,6 +396,22 @@ fn a_drive_belongs_to_one_group_until_that_is_gone() {
     let twice = bench.setups[0].clone();
     bench.setups.push(twice);
     assert!(matches!(bench.try_open(), Err(GroupError::Taken { .. })));
+}
+
+#[test]
+fn a_group_that_is_given_up_leaves_the_ramps_of_its_drives_as_they_were() {
+    let mut bench = Bench::new(&[(devices::model("zlac8030l").unwrap(), ModeOfOperation::PROFILE_VELOCITY)]);
+    let node = bench.network.node(node(1));
+    let ramps =
+        async || [node.read::<u32>(Mux::new(0x6083, 0)).await.unwrap(), node.read(Mux::new(0x6084, 0)).await.unwrap()];
+    let before = block_on(&mut bench.world, ramps()).unwrap();
+    let mut group = bench.open();
+    group.start_move(&turns(&[2.5]), None).unwrap();
+    (0..100).for_each(|_| drop(bench.cycle(&mut group)));
+    assert_ne!(block_on(&mut bench.world, ramps()).unwrap(), before, "each cycle is a new speed");
+    drop(group);
+    block_on(&mut bench.world, bench.network.stop_and_release()).unwrap();
+    assert_eq!(block_on(&mut bench.world, ramps()).unwrap(), before);
 }
 
 #[test]

@@ -87,3 +87,26 @@ fn what_a_node_behind_a_cut_cable_tries_is_not_heard_by_clients() {
     let is_boot_up = |heard: &&Heard| matches!(heard, Heard::Carried { frame, .. } if frame.to_string() == "705#00");
     assert_eq!(heard.iter().filter(is_boot_up).count(), 1, "{heard:?}");
 }
+
+/// CAN has no means against two nodes that send the same frame at the same time: both have sent it (ISO 11898-1). A client whose frame
+/// was one of them is served, and the next ones of it too.
+#[test]
+fn a_frame_that_a_drive_sends_as_well_at_the_same_time_is_the_clients_too() {
+    let mut world = World::new(Bitrate::K500, 1);
+    let drive = world.add_probe();
+    world.add_probe();
+    let pacer = Pacer::new(Clock::Manual, Speed::Times(1.0));
+    let mut served = ServedWorld::new(world, pacer, false, Messages::silent());
+    let client = ClientId::of(7);
+    let frames: [Frame; 2] = ["707#05", "604#4041600000000000"].map(|text| text.parse().expect("a frame"));
+    served.world.send(drive, frames[0]).expect("a probe");
+    frames.iter().for_each(|frame| served.inject(client, frame));
+    assert!(matches!(served.command("run 10ms"), Commanded::Begun));
+    let target = served.target(Instant::from_millis(1));
+    served.advance_to(target);
+    let heard = std::iter::from_fn(|| served.take_heard()).filter_map(|heard| match heard {
+        Heard::Carried { frame, from, .. } => Some((frame, from)),
+        _ => None,
+    });
+    assert_eq!(heard.collect::<Vec<_>>(), frames.map(|frame| (frame, Some(client))));
+}

@@ -12,6 +12,7 @@ const QUEUE: usize = 8192;
 pub(super) struct Probe {
     outgoing: VecDeque<Frame>,
     received: VecDeque<(Instant, Frame)>,
+    sent: u64,
 }
 
 impl Probe {
@@ -25,6 +26,10 @@ impl Probe {
 
     pub(super) fn has_received(&self) -> bool {
         !self.received.is_empty()
+    }
+
+    pub(super) const fn sent(&self) -> u64 {
+        self.sent
     }
 
     pub(super) fn poll_received(&mut self) -> Option<(Instant, Frame)> {
@@ -41,6 +46,10 @@ impl Station for Probe {
     }
 
     fn handle_timeout(&mut self, _: Instant) {}
+
+    fn handle_transmitted(&mut self, _: &Frame, _: Instant) {
+        self.sent += 1;
+    }
 
     fn poll_transmit(&mut self) -> Option<Frame> {
         self.outgoing.pop_front()

@@ -67,7 +67,7 @@ fn a_group_is_stopped_when_its_command_is_asked_to_end_or_killed() {
             let said = String::from_utf8(ended.stdout).unwrap();
             for node in [4, 5] {
                 assert!(
-                    said.contains(&format!("node {node} was moving and has been quick-stopped")),
+                    said.contains(&format!("node {node} was set in motion and has been quick-stopped")),
                     "{signal}: {said}"
                 );
             }

@@ -52,7 +52,7 @@ fn every_signal_that_asks_for_an_end_stops_the_drive_first() {
         assert!(speed.abs() < 20.0, "{signal}: still at {speed} r/min");
         let error = String::from_utf8(ended.stderr).unwrap();
         assert_eq!(ended.status.code(), Some(status), "{signal}: {error}");
-        for part in [said, "node 4 was moving and has been quick-stopped"] {
+        for part in [said, "node 4 was set in motion and has been quick-stopped"] {
             assert!(error.contains(part), "{signal}: {part:?} in {error}");
         }
         done(&["--bus", &bus, "--model", "4=zlac8030l", "disable", "4"]);

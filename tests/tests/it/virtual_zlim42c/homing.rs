@@ -168,6 +168,25 @@ fn a_halted_homing_goes_on_and_attains() {
     assert_eq!(bench.statusword() & BITS, 1 << 8 | 1 << 10);
 }
 
+/// 605Bh = 1: slow down and go to Ready to switch on (CiA 402-2, shutdown option code); a shaft that stands has slowed down.
+#[test]
+fn a_homing_that_a_halt_holds_is_shut_down_and_left_for_another_mode() {
+    for halt in [0x11F, 0x10F] {
+        for (controlword, mask, state) in [(0x06, 0x6F, 0x21), (0x07, 0x6F, 0x23), (0x00, 0x4F, 0x40)] {
+            let mut bench = on_track("halt_on_the_way", 17);
+            bench.set(0x6040, 0x1F).run_ms(300);
+            bench.set(0x6040, halt).run_ms(500).reads(0x606C, 0);
+            bench.set(0x6040, controlword).run_ms(50);
+            assert_eq!(bench.statusword() & mask, state, "{halt:X}h, then {controlword:X}h");
+        }
+        let mut bench = on_track("halt_on_the_way", 17);
+        bench.set(0x6040, 0x1F).run_ms(300);
+        bench.set(0x6040, halt).run_ms(500).reads(0x606C, 0);
+        bench.set(0x6060, 3).set(0x60FF, 60).set(0x6040, 0x0F).run_ms(1000);
+        assert_eq!((bench.get(0x6061), bench.get(0x606C)), (3, 60), "{halt:X}h");
+    }
+}
+
 #[test]
 fn an_interrupted_homing_starts_again_with_the_next_edge_and_a_quick_stop_ends_it() {
     let mut bench = on_track("between", 18);

@@ -35,6 +35,10 @@ impl PowerDrive {
             self.set_points.abort(self.axis.point().position);
             self.axis.begin(HERE);
         }
+        // A shaft that a halt holds already stands for the stop that takes its place, too.
+        if self.axis.has_stopped() {
+            self.end_stop(parameters);
+        }
     }
 
     fn wanted_stop(&self, targets: &Targets, parameters: &Parameters) -> Option<(StopCause, StopRamp)> {

@@ -1,0 +1,49 @@
+//! How long a motor turns, and what a drive has after a motion.
+
+use std::path::Path;
+
+use processes::scratch;
+
+use super::virtual_bus::VirtualBus;
+
+/// At 60 r/min a second longer is a turn more, whatever the looks at the drive take on the bus: each takes a millisecond and more.
+#[test]
+fn a_motor_turns_for_as_long_as_it_was_asked_to() {
+    for model in ["zlac8030l", "m4230e17b50", "zlim42c", "cia402"] {
+        let turned_deg = |time: &str| {
+            let bench = VirtualBus::of(&[&format!("{model}@4")]).with(&["--model", &format!("4={model}")]);
+            let ended = bench.json(&["velocity", "4", "60rpm", "--for", time]);
+            ended["before_stop"]["angle_deg"].as_f64().unwrap_or_else(|| panic!("{ended}"))
+        };
+        let second = (turned_deg("3s") - turned_deg("1s")) / 2.0;
+        // A look later than asked at most, at both ends.
+        assert!((second - 360.0).abs() < 8.0, "{model}: {second} degrees in a second");
+    }
+}
+
+/// Ramps that are set for the cycles of a group or a base are as before afterwards: a later move by the drive's own ramps would lose steps.
+#[test]
+fn a_group_and_a_base_leave_the_ramps_of_their_drives_as_they_were() {
+    let folder = scratch("ramps");
+    let base = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n[[drive]]\nmodel = 'zlac8030l'\nnode = 5\n[base]\nwheels = [4, 5]\nturns = [1, -1]\n\
+                wheel_base_m = 0.5\nwheel_radius_m = 0.084\nlinear_m_s = 0.5\nangular_rad_s = 1\nwheel_m_s = 0.8\nwheel_m_s2 = 0.7\n";
+    let machine = folder.write("base.toml", base);
+    let ramps = |bench: &VirtualBus, node: &str| {
+        ["6083", "6084"].map(|object| bench.json(&["read", node, object])["value"].as_i64().unwrap())
+    };
+    for (model, words) in [
+        ("zlim42c", &["group", "move", "4=90deg"][..]),
+        ("zlim42c", &["test-motion", "4", "sine", "--by", "20deg"]),
+        ("zlac8030l", &["group", "move", "4=90deg"]),
+    ] {
+        let bench = VirtualBus::of(&[&format!("{model}@4")]).with(&["--model", &format!("4={model}")]);
+        let before = ramps(&bench, "4");
+        bench.done(words);
+        assert_eq!(ramps(&bench, "4"), before, "{model}: {words:?}");
+    }
+    let bench = VirtualBus::of(&["zlac8030l@4", "zlac8030l@5"]);
+    let before = ["4", "5"].map(|node| ramps(&bench, node));
+    assert!(Path::new(&machine).exists());
+    bench.done(&["--machine", &machine, "drive-base", "--linear", "0.2", "--for", "1s"]);
+    assert_eq!(["4", "5"].map(|node| ramps(&bench, node)), before);
+}
