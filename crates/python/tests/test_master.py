@@ -135,6 +135,10 @@ def test_wrong_orders_say_what_would_be_right(world):
         for order, error, words in (
             (lambda: drive.move(), ValueError, "degrees or in counts"),
             (lambda: drive.velocity(float("nan")), ValueError, "needs a number"),
+            (lambda: drive.velocity(60, acceleration_rpm_s=float("nan")), ValueError, "acceleration_rpm_s is NaN"),
+            (lambda: drive.velocity(60, deceleration_rpm_s=-600), ValueError, "deceleration_rpm_s is -600"),
+            (lambda: drive.move(10, speed_rpm=-60), ValueError, "speed_rpm is -60: expected a finite number above 0"),
+            (lambda: drive.home(35, speed_rpm=float("inf")), ValueError, "speed_rpm is inf"),
             (lambda: drive.home(1000), ValueError, "-128 to 127"),
             (lambda: network.nmt("halt"), ValueError, "pre-operational"),
             (lambda: network.drive(5, "zlac"), ValueError, "zlac8030l"),

@@ -69,7 +69,7 @@ fn several_objects_of_an_unknown_node_are_found_by_asking() {
 #[test]
 fn a_motion_that_takes_longer_than_it_may_is_given_up_and_stopped() {
     let bench = VirtualBus::of(&["zlac8030l@4"]).with(&["--model", "4=zlac8030l"]);
-    let late = bench.run(&["move", "4", "200turn", "--relative", "--profile-velocity", "60rpm", "--within", "2s"]);
+    let late = bench.run(&["move", "4", "1.9turn", "--relative", "--profile-velocity", "60rpm", "--within", "2s"]);
     assert_eq!(late.status, Some(1), "{}", late.err);
     assert!(late.err.contains("node 4 was set in motion and has been quick-stopped"), "{}", late.err);
     let speed = bench.report(4).velocity_rpm;

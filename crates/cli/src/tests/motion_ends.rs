@@ -47,3 +47,26 @@ fn a_group_and_a_base_leave_the_ramps_of_their_drives_as_they_were() {
     bench.done(&["--machine", &machine, "drive-base", "--linear", "0.2", "--for", "1s"]);
     assert_eq!(["4", "5"].map(|node| ramps(&bench, node)), before);
 }
+
+/// 10 turns at 60 r/min take 10 s: a move that is given 4 s is refused, and no load is blamed for it.
+#[test]
+fn a_move_that_cannot_be_there_in_time_is_refused_before_it_begins() {
+    let bench = VirtualBus::of(&["zlac8030l@4"]);
+    let ended = bench.run(&["move", "4", "10turn", "--profile-velocity", "60rpm", "--within", "4s"]);
+    assert!(
+        ended.status == Some(1) && ended.err.contains("of 60 r/min the way takes 10.0 s, and 4 s were given"),
+        "{}",
+        ended.err
+    );
+    assert_eq!(bench.report(4).position, 0);
+    bench.done(&["move", "4", "1turn", "--profile-velocity", "60rpm", "--within", "4s"]);
+}
+
+/// A limit switch that is met keeps the drive from taking a set-point: the input is named ("ZLIM42-C CANopen manual V1.03", 3).
+#[test]
+fn a_move_into_a_limit_that_is_active_names_the_input() {
+    let text = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\noptions = { '2030:02' = 3 }\nswitches = { X0 = ['min', 0] }\n";
+    let bench = VirtualBus::of_machine(&machine::file::Machine::parse(text).unwrap()).with(&["--model", "2=zlim42c"]);
+    let ended = bench.run(&["move", "2", "-1turn"]);
+    assert!(ended.status == Some(1) && ended.err.contains("X0 (negative limit)"), "{}", ended.err);
+}

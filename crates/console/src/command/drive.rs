@@ -346,6 +346,8 @@ pub fn guessed(drive: &Drive) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use canopen::NodeId;
+
     use super::*;
 
     fn report(power: PowerState) -> StateReport {

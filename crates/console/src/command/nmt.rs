@@ -167,6 +167,13 @@ impl Nmt {
                 .at_node(id);
         let facts = handle.facts();
         let said = facts.nmt_state.filter(|_| facts.heartbeat_at.is_some_and(|at| at > before));
+        if said == Some(wanted) {
+            return failure
+                .because(format!(
+                    "its heartbeat says {wanted}, as that of this model does with an alarm too: which of them it is does not show"
+                ))
+                .next(format!("a node that is stopped answers no SDO: ferrodrive read {id} 1000"));
+        }
         if let Some(state) = said {
             return failure
                 .because(format!("its heartbeat reports that it is {state}"))

@@ -133,6 +133,12 @@ fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -
     let storage = drive.description().map(|profile| profile.storage);
     if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
         let node = drive.node().id();
+        if let Some((by_itself, true)) = storage.and_then(|storage| storage.save_on_write) {
+            let (object, value) = (by_itself.object, by_itself.value);
+            return Some(format!(
+                "it takes effect at the next restart; it is stored by then while {object} is {value}, as delivered, else: ferrodrive save {node}"
+            ));
+        }
         return Some(format!("it takes effect at the next restart, if it is stored by then: ferrodrive save {node}"));
     }
     in_effect(limits?, number?)

@@ -33,6 +33,8 @@ pub(crate) enum Trigger {
     NoProfileVelocity(Mux),
     /// By the speed of position moves, in this object, the move may take this long.
     TooSlow { object: Mux, rpm: f64, limit: Duration },
+    /// At this speed the way alone takes longer than the time that was given.
+    TooShort { object: Mux, rpm: f64, needed: Duration, within: Duration },
     /// The target was not reached in the time it should take: where it is, where it should be, in `unit`.
     Late { at: f64, target: f64, unit: &'static str, waited: Duration },
     /// The shaft rests away from its target, or turns at another speed; `target` was asked for, in `unit`.
@@ -156,6 +158,15 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         ),
         Trigger::NoProfileVelocity(object) => no_profile_velocity(object),
         Trigger::TooSlow { object, rpm, limit } => too_slow(object, *rpm, *limit),
+        Trigger::TooShort { object, rpm, needed, within } => (
+            format!(
+                "At its profile velocity ({object}) of {} r/min the way takes {:.1} s, and {} s were given. Nothing has moved",
+                Shown(*rpm),
+                needed.as_secs_f64(),
+                Shown(within.as_secs_f64())
+            ),
+            "Give more time (--within), or a higher speed (--profile-velocity)".to_owned(),
+        ),
         Trigger::NotHome { at, waited } => (
             format!("After {:.1} s it is at {at:.0} counts and still looks for its reference", waited.as_secs_f64()),
             "Check that the method's switch is wired, that its input is set to that function, and which way the method \

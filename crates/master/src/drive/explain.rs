@@ -70,6 +70,8 @@ impl Drive {
         }
         let is_known = match trigger {
             Trigger::Late { .. } => false,
+            // Of a set-point that it does not take an input is a reason, and no set-point.
+            Trigger::NoAcknowledge => true,
             // A drive that an input has stopped may set its target to 0 by itself: that was no other master then.
             Trigger::Elsewhere { by, .. } => !matches!(by, Interference::Unknown),
             _ => return None,

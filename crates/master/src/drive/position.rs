@@ -73,6 +73,13 @@ impl Drive {
             let (object, rpm) = (profile_velocity.object, speed);
             return Err(self.not_reached(INTENT, Trigger::TooSlow { object, rpm, limit }).await);
         }
+        // Without ramps: what takes longer than that cannot be there in time.
+        let way_s = target.abs_diff(began_at) as f64 / of_output / speed.abs() * 60.0;
+        let needed = Duration::try_from_secs_f64(way_s).unwrap_or(Duration::MAX);
+        if let Some(within) = options.within.filter(|within| *within < needed) {
+            let (object, rpm) = (profile_velocity.object, speed);
+            return Err(self.not_reached(INTENT, Trigger::TooShort { object, rpm, needed, within }).await);
+        }
         self.enable().await?;
         self.give_set_point(INTENT, counts, relative).await?;
         let notes = self.notes(stopped).await;

@@ -407,7 +407,9 @@ fn a_group_that_is_given_up_leaves_the_ramps_of_its_drives_as_they_were() {
     let before = block_on(&mut bench.world, ramps()).unwrap();
     let mut group = bench.open();
     group.start_move(&turns(&[2.5]), None).unwrap();
-    (0..100).for_each(|_| drop(bench.cycle(&mut group)));
+    for _ in 0..100 {
+        bench.cycle(&mut group);
+    }
     assert_ne!(block_on(&mut bench.world, ramps()).unwrap(), before, "each cycle is a new speed");
     drop(group);
     block_on(&mut bench.world, bench.network.stop_and_release()).unwrap();

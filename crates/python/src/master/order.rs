@@ -54,7 +54,7 @@ impl Order {
             "move" => Motion::Move {
                 to: self.angle()?.into(),
                 relative: self.relative,
-                speed: self.speed(),
+                speed: self.speed()?,
                 manner: self.manner()?,
             }
             .into(),
@@ -62,21 +62,22 @@ impl Order {
                 let method = self.counts.and_then(|method| i8::try_from(method).ok());
                 let method = method.ok_or_else(|| bad_value("a homing method is a number from -128 to 127"))?;
                 let Manner { wait, within, .. } = self.manner()?;
-                Motion::Home { method, speed: self.speed(), wait, within }.into()
+                Motion::Home { method, speed: self.speed()?, wait, within }.into()
             }
             other => return Err(bad_value(format!("a drive cannot {other:?}"))),
         })
     }
 
-    fn speed(&self) -> Option<Along<Rpm>> {
-        self.speed_rpm.map(|speed| Rpm(speed).into())
+    /// Of a way whose target decides the direction.
+    fn speed(&self) -> PyResult<Option<Along<Rpm>>> {
+        Ok(above_zero("speed_rpm", self.speed_rpm)?.map(|speed| Rpm(speed).into()))
     }
 
     fn manner(&self) -> PyResult<Manner> {
-        let ramp = |rate: Option<f64>| rate.map(|rate| Ramp::RpmPerSecond(rate).into());
+        let ramp = |name, rate| Ok::<_, PyErr>(above_zero(name, rate)?.map(|rate| Ramp::RpmPerSecond(rate).into()));
         Ok(Manner {
-            acceleration: ramp(self.acceleration_rpm_s),
-            deceleration: ramp(self.deceleration_rpm_s),
+            acceleration: ramp("acceleration_rpm_s", self.acceleration_rpm_s)?,
+            deceleration: ramp("deceleration_rpm_s", self.deceleration_rpm_s)?,
             wait: self.wait,
             within: self.limit_s.map(duration).transpose()?,
         })
@@ -92,6 +93,16 @@ impl Order {
             Some(counts) => Ok(Angle::Counts(counts)),
             None => self.value().map(|degrees| Angle::Turns(degrees / 360.0)),
         }
+    }
+}
+
+/// A number of which there has to be some: NaN, infinitely many and none are refused before anything is sent.
+fn above_zero(name: &str, value: Option<f64>) -> PyResult<Option<f64>> {
+    match value {
+        Some(number) if !(number.is_finite() && number > 0.0) => Err(bad_value(format!(
+            "{name} is {number}: expected a finite number above 0, or None to leave it as the drive has it"
+        ))),
+        value => Ok(value),
     }
 }
 

@@ -116,6 +116,11 @@ impl Transaction {
                 "{object} had the wanted value, and has {found} after all writes: writing another object changed it"
             ));
         }
+        let by_itself = model.and_then(|model| model.storage.save_on_write);
+        if let Some((write, true)) = by_itself.filter(|_| applied.writes > 0 && !self.save) {
+            let (object, value) = (write.object, write.value);
+            report.notes.push(format!("the drive stores each write by itself while {object} is {value}, as delivered"));
+        }
         if self.save {
             progress.show(format!("node {id}: storing"));
             drive.save().await.map_err(|error| unsaved(error, &report))?;
