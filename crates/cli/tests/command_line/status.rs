@@ -256,7 +256,8 @@ fn examples_of_the_help_of_what_is_captured_moved_and_drawn_run() {
         let output = processes::command(&words).current_dir(&folder).output().unwrap();
         assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     };
-    let motion = "--speed 20rpm --time 20ms --acceleration 3000rpm/s --period 2ms --capture current_demand,position";
+    // Fast enough for its frequency response to be that of a mass.
+    let motion = "--speed 60rpm --time 40ms --acceleration 6000rpm/s --period 2ms --capture current_demand,position";
     run(&format!("test-motion 4 prbs {motion} -o run.mcap"));
     for command in ["capture", "test-motion", "tune"] {
         let help = done(&[command, "-h"]).out;

@@ -169,7 +169,7 @@ fn a_motion_that_does_not_get_there_names_what_the_drive_shows_of_the_cause() {
     let blocked = |bench: &mut Bench| bench.stimulus("rotor lock");
     for (name, prepare, by_speed, part) in [
         ("cia402", no_torque as fn(&mut Bench), true, "6072h"),
-        ("cia402", limited, false, "607Dh"),
+        ("cia402", limited, true, "607Dh"),
         ("zlim42c", at_limit, true, "X1"),
         ("zlac8030l", stopped, true, "X0"),
     ] {
