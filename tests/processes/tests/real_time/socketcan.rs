@@ -27,9 +27,12 @@ fn set(interface: &str, state: &str) {
     run("ip", &["link", "set", interface, state]);
 }
 
+/// How long an answer is waited for: beside other steps a frame may take half a second through the emulated machine.
+const PATIENT: &str = "5s";
+
 #[track_caller]
 fn on(bus: &str, arguments: &[&str]) -> Ended {
-    let ended = ferrodrive(&[&["--bus", bus], arguments].concat());
+    let ended = ferrodrive(&[&["--bus", bus, "--timeout", PATIENT], arguments].concat());
     assert_eq!(ended.status, Some(0), "{bus} {arguments:?}: {}{}", ended.out, ended.err);
     ended
 }
@@ -348,7 +351,7 @@ fn every_command_of_the_page_ends_well() {
             ["ferrodrive", "--bus", bus, "sim", ref rest @ ..] => {
                 simulators.push(Simulator::start(&[rest, &["--bus", bus]].concat()));
             }
-            ["ferrodrive", ref arguments @ ..] => drop(processes::done(arguments)),
+            ["ferrodrive", ref arguments @ ..] => drop(processes::done(&[&["--timeout", PATIENT], arguments].concat())),
             [program, ref arguments @ ..] => run(program, arguments),
             [] => continue,
         }
