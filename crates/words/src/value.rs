@@ -114,6 +114,28 @@ pub fn bytes_in_hexadecimal(digits: &str) -> Result<Vec<u8>, String> {
     bytes.ok_or_else(|| "bytes are pairs of hexadecimal digits, e.g. hex:01AAFF".into())
 }
 
+/// Types by the word that stands before a value.
+const TYPES: [(&str, DataType); 8] = [
+    ("i8", DataType::Integer8),
+    ("i16", DataType::Integer16),
+    ("i32", DataType::Integer32),
+    ("i64", DataType::Integer64),
+    ("u8", DataType::Unsigned8),
+    ("u16", DataType::Unsigned16),
+    ("u32", DataType::Unsigned32),
+    ("text", DataType::VisibleString),
+];
+
+/// The word before a value of this type, e.g. `u16`, where it has one ([`typed_alone`]).
+pub fn type_word(data_type: DataType) -> Option<&'static str> {
+    TYPES.iter().find(|(_, its)| *its == data_type).map(|(word, _)| *word)
+}
+
+/// The type that this word stands for, in any case of letters.
+pub fn type_of_word(word: &str) -> Option<DataType> {
+    TYPES.iter().find(|(its, _)| its.eq_ignore_ascii_case(word)).map(|(_, data_type)| *data_type)
+}
+
 /// Reads a value of an object that no table describes: `type:value`, e.g. `u16:15`, `text:left wheel`, `hex:01AA`.
 pub fn typed_alone(text: &str) -> Result<Typed, String> {
     match text.split_once(':') {
@@ -131,15 +153,9 @@ pub fn typed_alone(text: &str) -> Result<Typed, String> {
 pub fn typed_value(text: &str) -> Result<(DataType, i64), String> {
     const EXPECTED: &str = "an object that is in no known table needs its type with the value, e.g. u16:15, i32:-100, u8:0x3, text:left, hex:01AA";
     let (name, number) = text.split_once(':').ok_or(EXPECTED)?;
-    let data_type = match name.to_ascii_lowercase().as_str() {
-        "i8" => DataType::Integer8,
-        "i16" => DataType::Integer16,
-        "i32" => DataType::Integer32,
-        "u8" => DataType::Unsigned8,
-        "u16" => DataType::Unsigned16,
-        "u32" => DataType::Unsigned32,
-        _ => return Err(format!("'{name}' is not a type; {EXPECTED}")),
-    };
+    let of_numbers = |data_type: &DataType| !matches!(data_type, DataType::Integer64 | DataType::VisibleString);
+    let data_type =
+        type_of_word(name).filter(of_numbers).ok_or_else(|| format!("'{name}' is not a type; {EXPECTED}"))?;
     let value = integer(number).ok_or_else(|| format!("'{number}' is not a whole number; {EXPECTED}"))?;
     let (low, high) = data_type.range();
     if (low..=high).contains(&value) {

@@ -23,7 +23,7 @@ use words::models::resolve as resolve_model;
 use words::node::node;
 use words::object::object;
 use words::unit::split_factor;
-use words::value::{Typed, bytes_in_hexadecimal, typed_alone, typed_for};
+use words::value::{Typed, bytes_in_hexadecimal, type_of_word, type_word, typed_alone, typed_for};
 
 const KEYS: &[&str] = &["model", "node", "identity", "values"];
 const IDENTITY_KEYS: &[&str] = &["device_type", "vendor_id", "product_code", "revision_number"];
@@ -182,30 +182,16 @@ fn bytes_of(field: &Field<'_>, row: Option<&'static Entry>, resolution: i64) -> 
     Ok(typed.bytes())
 }
 
-/// How types are written before a value whose object no table describes ([`typed_alone`]).
-const fn type_word(data_type: DataType) -> Option<&'static str> {
-    Some(match data_type {
-        DataType::Integer8 => "i8",
-        DataType::Integer16 => "i16",
-        DataType::Integer32 => "i32",
-        DataType::Integer64 => "i64",
-        DataType::Unsigned8 => "u8",
-        DataType::Unsigned16 => "u16",
-        DataType::Unsigned32 => "u32",
-        DataType::VisibleString => "text",
-        _ => return None,
-    })
-}
-
 /// The value behind its type, which a file for a model of a data sheet has, so that it can be read without that.
 fn without_type<'a>(row: &Entry, text: &'a str) -> Result<&'a str, String> {
-    let words = ["i8", "i16", "i32", "i64", "u8", "u16", "u32", "text"];
-    let Some((word, value)) = text.split_once(':').filter(|(word, _)| words.contains(word)) else { return Ok(text) };
-    match type_word(row.data_type) {
-        Some(own) if own == word => Ok(value),
-        // A text may begin with the name of a type.
-        _ if row.data_type == DataType::VisibleString => Ok(text),
-        _ => Err(format!("'{text}' for {} {}, which is of type {}", row.mux(), row.name, row.data_type.name())),
+    let typed = text.split_once(':').and_then(|(word, value)| Some((type_of_word(word)?, value)));
+    match typed {
+        Some((data_type, value)) if data_type == row.data_type => Ok(value),
+        // A text may begin with the name of another type.
+        Some(_) if row.data_type != DataType::VisibleString => {
+            Err(format!("'{text}' for {} {}, which is of type {}", row.mux(), row.name, row.data_type.name()))
+        }
+        _ => Ok(text),
     }
 }
 
