@@ -7,8 +7,6 @@ use master::Gear;
 use master::drive::{Drive, DriveState};
 use serde::Serialize;
 
-use super::estop::{Estop, StopReport, stop_all};
-use crate::context::Context;
 use crate::failure::Failure;
 use plot::Paint;
 use words::node::{Nodes, nodes};
@@ -75,41 +73,6 @@ pub struct QuickStop {
     /// Node-ID, or all
     #[arg(value_name = "NODE|all", value_parser = nodes)]
     pub(super) nodes: Nodes,
-}
-
-/// What came of a stop.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub enum StopOutcome {
-    /// Of one drive.
-    One(Box<StateReport>),
-    /// Of every drive on the bus.
-    All(Box<StopReport>),
-}
-
-impl StopOutcome {
-    /// Of every drive.
-    pub fn all(report: StopReport) -> Self {
-        Self::All(Box::new(report))
-    }
-
-    /// Why not every drive was seen to stand.
-    pub fn failure(&self) -> Option<Failure> {
-        match self {
-            Self::One(_) => None,
-            Self::All(report) => report.failure(),
-        }
-    }
-}
-
-impl StopOutcome {
-    /// As lines for people.
-    pub fn text(&self, paint: Paint) -> String {
-        match self {
-            Self::One(report) => report.text(paint),
-            Self::All(report) => report.text(paint),
-        }
-    }
 }
 
 /// Reset the fault of a drive, or of all, once its cause is gone
@@ -188,27 +151,6 @@ struct FaultReport {
     code: u16,
     name: &'static str,
     remedy: &'static str,
-}
-
-impl Stop {
-    /// Stops and shows the state.
-    pub async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
-        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StopOutcome::all) };
-        let drive = context.drive_to_stop(node).await?;
-        drive.stop().await?;
-        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
-    }
-}
-
-impl QuickStop {
-    /// Stops at once and shows the state. The stop goes out before the model is asked for.
-    pub async fn run(&self, context: &Context) -> Result<StopOutcome, Failure> {
-        let Nodes::One(node) = self.nodes else { return Estop::default().run(context).await.map(StopOutcome::all) };
-        context.quick_stop(node).await?;
-        let drive = context.drive_to_stop(node).await?;
-        drive.quick_stop().await?;
-        Ok(StopOutcome::One(Box::new(StateReport::read(&drive).await?)))
-    }
 }
 
 impl StateReport {

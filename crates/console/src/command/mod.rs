@@ -25,7 +25,6 @@ use words::node::Nodes;
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::guard::GuardArgs;
-use drive::StopOutcome;
 pub use effect::CommandEffect;
 use motion::MotionOutcome;
 use object::ObjectReport;
@@ -76,12 +75,10 @@ pub enum Outcome {
     Scanned(Box<ScanReport>),
     /// An object that was written.
     Written(Box<ObjectReport>),
-    /// What a drive says of itself.
+    /// What drives say of themselves, or how they were stopped.
     State(StateOutcome),
     /// Why it does not move.
     Explained(Box<explain::Explanation>),
-    /// Of a stop.
-    Stopped(StopOutcome),
     /// Of a motion.
     Moved(Box<MotionOutcome>),
     /// Parameters that a drive has stored.
@@ -103,9 +100,9 @@ impl Command {
             Self::Explain(command) => Outcome::Explained(Box::new(command.run(context).await?)),
             Self::Enable(command) => Outcome::State(command.run(context).await?),
             Self::Disable(command) => Outcome::State(command.run(context).await?),
-            Self::Estop(command) => Outcome::Stopped(StopOutcome::all(command.run(context).await?)),
-            Self::Stop(command) => Outcome::Stopped(command.run(context).await?),
-            Self::QuickStop(command) => Outcome::Stopped(command.run(context).await?),
+            Self::Estop(command) => Outcome::State(command.run(context).await?.into()),
+            Self::Stop(command) => Outcome::State(command.run(context).await?),
+            Self::QuickStop(command) => Outcome::State(command.run(context).await?),
             Self::Reset(command) => Outcome::State(command.run(context).await?),
             Self::Velocity(command) => Outcome::Moved(Box::new(command.run(context).await?)),
             Self::Move(command) => Outcome::Moved(Box::new(command.run(context).await?)),
@@ -163,7 +160,6 @@ impl Outcome {
     /// Why the command fails although it has something to report.
     pub fn failure(&self) -> Option<Failure> {
         match self {
-            Self::Stopped(outcome) => outcome.failure(),
             Self::State(outcome) => outcome.failure(),
             Self::Explained(explanation) => explanation.failure(),
             Self::Scanned(_) | Self::Written(_) | Self::Moved(_) | Self::Stored(_) | Self::Managed(_) => None,
@@ -179,7 +175,6 @@ impl Outcome {
             Self::Written(report) => report.text(paint),
             Self::State(report) => report.text(paint),
             Self::Explained(report) => explain::text(report, paint),
-            Self::Stopped(report) => report.text(paint),
             Self::Moved(report) => report.text(paint),
             Self::Stored(report) => report.text(paint),
             Self::Managed(report) => report.text(paint),

@@ -1,10 +1,11 @@
-//! `state all`, `enable all`, `disable all` and `reset all`: what is done with a drive, done with every drive on the bus.
+//! `state`, `enable`, `disable`, `stop`, `quick-stop` and `reset`, of one drive or of every drive on the bus.
 
 use canopen::NodeId;
 use master::join_all;
 use serde::Serialize;
 
-use super::drive::{Disable, Enable, Reset, State, StateReport};
+use super::drive::{Disable, Enable, QuickStop, Reset, State, StateReport, Stop};
+use super::estop::{Estop, StopReport, stop_all};
 use super::on_bus::drives_on_bus;
 use crate::context::Context;
 use crate::failure::Failure;
@@ -19,6 +20,14 @@ pub enum StateOutcome {
     One(Box<StateReport>),
     /// Of every drive on the bus.
     All(Box<SeveralReport>),
+    /// Of every drive on the bus, which was to stop.
+    Stopped(Box<StopReport>),
+}
+
+impl From<StopReport> for StateOutcome {
+    fn from(report: StopReport) -> Self {
+        Self::Stopped(Box::new(report))
+    }
 }
 
 impl StateOutcome {
@@ -38,6 +47,7 @@ impl StateOutcome {
         match self {
             Self::One(_) => None,
             Self::All(report) => report.failure(),
+            Self::Stopped(report) => report.failure(),
         }
     }
 
@@ -46,6 +56,7 @@ impl StateOutcome {
         match self {
             Self::One(report) => report.text(paint),
             Self::All(report) => report.text(paint),
+            Self::Stopped(report) => report.text(paint),
         }
     }
 }
@@ -66,7 +77,7 @@ impl Enable {
             drive.enable().await?;
             StateReport::read(&drive).await?.still_enabled()
         };
-        StateOutcome::of((context, self.nodes), "not enabled; the others are", enable).await
+        StateOutcome::of((context, self.nodes), "not enabled", enable).await
     }
 }
 
@@ -79,6 +90,27 @@ impl Disable {
             StateReport::read(&drive).await
         };
         StateOutcome::of((context, self.nodes), "not seen to be disabled: it may still have power", disable).await
+    }
+}
+
+impl Stop {
+    /// Stops and shows the state.
+    pub async fn run(&self, context: &Context) -> Result<StateOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return stop_all(context).await.map(StateOutcome::from) };
+        let drive = context.drive_to_stop(node).await?;
+        drive.stop().await?;
+        Ok(StateOutcome::One(Box::new(StateReport::read(&drive).await?)))
+    }
+}
+
+impl QuickStop {
+    /// Stops at once and shows the state. The stop goes out before the model is asked for.
+    pub async fn run(&self, context: &Context) -> Result<StateOutcome, Failure> {
+        let Nodes::One(node) = self.nodes else { return Estop::default().run(context).await.map(StateOutcome::from) };
+        context.quick_stop(node).await?;
+        let drive = context.drive_to_stop(node).await?;
+        drive.quick_stop().await?;
+        Ok(StateOutcome::One(Box::new(StateReport::read(&drive).await?)))
     }
 }
 
