@@ -74,7 +74,7 @@ fn what_a_servo_by_the_profile_holds_back_is_refused_before_anything_moves() {
             let ended = bench.run(words);
             assert!(ended.err.contains("by 6080h:00 max_motor_speed = 100"), "{model} {words:?}: {}", ended.err);
         }
-        bench.done(&["velocity", "5", "99rpm", "--for", "100ms"]);
+        bench.done(&["velocity", "5", "100rpm", "--for", "100ms"]);
     }
 }
 

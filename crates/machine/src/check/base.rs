@@ -1,4 +1,4 @@
-//! A base beside what its drives do, and beside the body that they move in a simulated machine.
+//! A base of a machine file, held against what its drives do and against the body that they move where it is simulated.
 
 use std::collections::BTreeMap;
 
@@ -89,7 +89,7 @@ fn other_body(machine: &Machine, base: &BasePlan, at: Place, report: &mut Report
     for (key, of_base, of_body) in lengths {
         if (of_base - of_body).abs() > 1e-9 {
             let what = format!(
-                "`{key}` is {} in [base] and {} in the body '{name}': the base is driven, and its pose is reckoned, with the first, and \
+                "`{key}` is {} in [base] and {} in the body '{name}': the base is driven, and its pose computed, by the first, and \
                  what is simulated moves by the second",
                 Shown(of_base),
                 Shown(of_body)

@@ -71,7 +71,9 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     intended.moved.iter().for_each(|moved| interpolation(moved, &intended.nodes, &mut report));
     groups::limits(&machine, &intended.nodes, &periods, &mut report);
     // The place of the base is behind those of the groups.
-    periods.last().iter().for_each(|at| base::limits(&machine, &intended.nodes, **at, &mut report));
+    if let Some(at) = periods.last() {
+        base::limits(&machine, &intended.nodes, *at, &mut report);
+    }
     let row = |(node, place): (&NodeId, &IntendedNode)| CheckedNode {
         name: place.name.clone(),
         node: Some(node.raw()),

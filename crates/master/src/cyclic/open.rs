@@ -6,8 +6,8 @@ use canopen::pdo::{Direction, EventTrigger, MappingRecord, PdoId, PdoNumber};
 use canopen::{Mux, NmtCommand, NmtState, NodeId};
 use cia402::ModeOfOperation;
 use cia402::object::{
-    CONTROLWORD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MODES_OF_OPERATION,
-    POSITION_ACTUAL_VALUE, STATUSWORD, TARGET_POSITION,
+    CONTROLWORD, INTERPOLATION_DATA_RECORD_1ST_SET_POINT, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, STATUSWORD,
+    TARGET_POSITION,
 };
 use devices::{AxisDescription, Description, Quantity};
 
@@ -349,7 +349,7 @@ impl Drive {
         let (number, set_point) = self.node().scaled_set_point(object, NumberForm::Signed, 1.0)?;
         let counts_per_turn = self.counts_per_turn().await?;
         let velocity = self.has(axis.units.target_velocity, "a target velocity")?;
-        let (rpm, speed) = self.highest_speed(axis, velocity).await?;
+        let (rpm, speed) = self.highest_speed(velocity).await?;
         let kind = TargetKind::Position {
             actual: self.node().signal(axis.object(POSITION_ACTUAL_VALUE))?,
             counts_per_turn,
@@ -360,26 +360,10 @@ impl Drive {
         Ok((number, Target { set_point, limits: self.limits(object).await?, kind, last_sent }))
     }
 
-    /// The highest speed that the drive follows, and the object that limits it: the target velocity's own limits, and
-    /// those of profiles (607Fh) and of the motor (6080h, in r/min) where the model has them.
-    async fn highest_speed(&self, axis: &AxisDescription, velocity: Quantity) -> Result<(f64, Bound), Error> {
-        let step = self.step_of(velocity).await?;
-        let own = Bound::from(self.limits(velocity.object).await?);
-        let mut least = (own.high as f64 * step, own);
-        for (object, step) in [(MAX_PROFILE_VELOCITY, step), (MAX_MOTOR_SPEED, self.gear().at_output(1.0))] {
-            let object = axis.object(object);
-            if self.known(INTENT)?.row(object).is_none() {
-                continue;
-            }
-            let bound = Bound::from(self.limits(object).await?);
-            let value = self.read_number(object).await?;
-            let rpm = value as f64 * step;
-            // Nothing could move within a limit of 0.
-            if value > 0 && rpm < least.0 {
-                least = (rpm, Bound { high: value, ..bound });
-            }
-        }
-        Ok(least)
+    /// The highest speed that the drive follows, r/min, and what limits it: the target velocity as far as it acts (607Fh, 6080h, its motor).
+    async fn highest_speed(&self, velocity: Quantity) -> Result<(f64, Bound), Error> {
+        let bound = Bound::from(self.limits(velocity.object).await?);
+        Ok((bound.high as f64 * self.step_of(velocity).await?, bound))
     }
 
     /// The TPDO with the statusword that is sent without a request, the one of the set-point's number first, then the

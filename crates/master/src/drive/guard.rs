@@ -230,8 +230,15 @@ impl Network {
     /// Writes what was noted of a node's objects.
     async fn put_back(&self, id: NodeId) -> Result<(), Error> {
         let node = self.node(id).by_server_in_use();
-        for (object, value) in self.take_former(id) {
-            node.download(object, value.as_bytes()).await?;
+        let mut former = self.take_former(id).into_iter();
+        while let Some((object, value)) = former.next() {
+            if let Err(error) = node.download(object, value.as_bytes()).await {
+                // The next release tries them again.
+                std::iter::once((object, value))
+                    .chain(former)
+                    .for_each(|(object, value)| self.note_former(id, object, value));
+                return Err(error);
+            }
         }
         Ok(())
     }

@@ -15,6 +15,14 @@ use super::state::refused_is_none;
 use crate::error::Error;
 use crate::limits::{HeldBy, Limits, Setting};
 
+/// Where the highest speed of the motor is said.
+enum MotorBound {
+    /// In the manual, r/min.
+    Manual(f64),
+    /// In this object, in r/min (6080h).
+    Object(Mux),
+}
+
 impl Drive {
     /// What an object takes at this time. Asks the drive for the objects that have a say in it.
     ///
@@ -75,20 +83,27 @@ impl Drive {
     /// What holds back a speed beside the object of its own row, in counts of this object: 6080h, which is in r/min of the motor whatever
     /// the units are (CiA 402-2, max motor speed) and of which 0 limits nothing, or the motor itself.
     async fn motor_speed(&self, object: Mux) -> Result<Option<(i64, HeldBy)>, Error> {
-        let Some(quantity) = self.speed_of_standard(object) else { return Ok(None) };
-        let most = self.place(MAX_MOTOR_SPEED);
-        let (rpm, by) = match self.axis_description().and_then(|axis| axis.max_motor_rpm) {
-            Some(rpm) => (rpm, HeldBy::Motor),
-            None if self.row(most, "find out its limits").is_err() => return Ok(None),
-            None => {
+        let Some((quantity, bound)) = self.motor_bound(object) else { return Ok(None) };
+        let (rpm, by) = match bound {
+            MotorBound::Manual(rpm) => (rpm, HeldBy::Motor),
+            MotorBound::Object(most) => {
                 let setting = refused_is_none(self.setting(most).await)?.filter(|setting| setting.value > 0);
                 let Some(setting) = setting else { return Ok(None) };
                 (setting.value as f64, HeldBy::Setting(setting))
             }
         };
         let counts = self.gear.at_output(rpm) / self.step_of(quantity).await?.abs();
-        // 1500 r/min may be a count less by the rounding of a quotient.
-        Ok(Some(((counts + 1e-6) as i64, by)))
+        // The count to which the very speed is rounded is within it.
+        Ok(Some(((counts - 1e-6).ceil() as i64, by)))
+    }
+
+    /// What bounds a target or profile velocity beside its row, where the axis has it where the standard does.
+    fn motor_bound(&self, object: Mux) -> Option<(Quantity, MotorBound)> {
+        let quantity = self.speed_of_standard(object)?;
+        let most = self.place(MAX_MOTOR_SPEED);
+        let by_object = || self.row(most, "find out its limits").is_ok().then_some(MotorBound::Object(most));
+        let by_manual = self.axis_description()?.max_motor_rpm.map(MotorBound::Manual);
+        Some((quantity, by_manual.or_else(by_object)?))
     }
 
     /// The target or profile velocity of an axis that has them where the standard does.
@@ -135,12 +150,11 @@ impl Drive {
 
     /// Whether what this object takes, or what of it acts, is not in its row alone: another object has a say in it, or the motor.
     pub fn is_limited_elsewhere(&self, row: &Entry) -> bool {
-        let (object, most) = (row.mux(), self.place(MAX_MOTOR_SPEED));
-        let by_motor = || {
-            let by_manual = self.axis_description().is_some_and(|axis| axis.max_motor_rpm.is_some());
-            self.speed_of_standard(object).is_some() && (by_manual || self.row(most, "find out its limits").is_ok())
-        };
-        row.resolution.is_some() || row.held_to.is_some() || self.scale_of_velocity_mode(object).is_some() || by_motor()
+        let object = row.mux();
+        row.resolution.is_some()
+            || row.held_to.is_some()
+            || self.scale_of_velocity_mode(object).is_some()
+            || self.motor_bound(object).is_some()
     }
 
     async fn setting(&self, object: Mux) -> Result<Setting, Error> {

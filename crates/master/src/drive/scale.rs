@@ -255,18 +255,17 @@ impl Drive {
     /// profile deceleration (6084h) becomes as hard as its current allows. What the objects had is put back when the drive stands and
     /// its guard is given back ([`Network::release_guards`](crate::Network::release_guards)).
     pub(crate) async fn write_ramps_of_a_cycle(&self, period: Duration, rpm_per_s: f64) -> Result<(), Error> {
-        let ramp = match self.ramps("follow a speed in each cycle")? {
-            Ramps::Times { .. } => Ramp::Time(period),
-            Ramps::Rates { .. } => Ramp::RpmPerSecond(2.0 * rpm_per_s),
-        };
-        let objects = match self.ramps("follow a speed in each cycle")? {
-            Ramps::Times { acceleration, deceleration, .. } => vec![acceleration, deceleration],
-            Ramps::Rates { acceleration, deceleration, scale: Scale::InTime { .. }, .. } => {
-                [acceleration, deceleration].into_iter().flat_map(|change| [change, time_of(change)]).collect()
+        let (ramp, changes, is_in_time) = match self.ramps("follow a speed in each cycle")? {
+            Ramps::Times { acceleration, deceleration, .. } => {
+                (Ramp::Time(period), [acceleration, deceleration], false)
             }
-            Ramps::Rates { acceleration, deceleration, .. } => vec![acceleration, deceleration],
+            Ramps::Rates { acceleration, deceleration, scale, .. } => {
+                let ramp = Ramp::RpmPerSecond(2.0 * rpm_per_s);
+                (ramp, [acceleration, deceleration], matches!(scale, Scale::InTime { .. }))
+            }
         };
-        for object in objects {
+        let times = changes.into_iter().filter(|_| is_in_time).map(time_of);
+        for object in changes.into_iter().chain(times) {
             self.node.network().note_former(self.node.id(), object, self.node.upload(object).await?);
         }
         // The change does not matter to either, but for being one.

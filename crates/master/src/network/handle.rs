@@ -285,7 +285,7 @@ impl Network {
         self.lock().former.entry(node).or_default().entry(object).or_insert(value);
     }
 
-    /// What was noted of a node, which is no longer noted.
+    /// Takes what was noted of a node's objects.
     pub(crate) fn take_former(&self, node: NodeId) -> BTreeMap<Mux, Payload> {
         self.lock().former.remove(&node).unwrap_or_default()
     }
