@@ -179,21 +179,38 @@ fn run_tests(python: &Path) -> Tally {
         "-v",
     ]);
     pytest.args(TESTS.iter().map(|folder| workspace::root().join(folder)));
-    let mut tally = Tally::default();
+    let (mut tally, mut lines) = (Tally::default(), Vec::new());
     let ended_well = process::run(&mut pytest, |line| {
         say(line);
         count(line, &mut tally);
+        lines.push(line.to_owned());
     });
     match ended_well {
         Ok(true) if tally == Tally::default() => Tally::failed("pytest ran nothing"),
         Ok(true) => tally,
         Ok(false) => {
             tally.failed = tally.failed.max(1);
-            tally.note = "a test of the Python package failed: read the lines above".to_owned();
+            (tally.note, tally.output) = failures(&lines);
             tally
         }
         Err(error) => Tally::failed(error),
     }
+}
+
+/// The names of the tests that failed, and what `pytest` says of them: what stands between the heading of the first and the list of those
+/// that were skipped or failed.
+fn failures(lines: &[String]) -> (String, Vec<String>) {
+    let is_heading =
+        |line: &str, names: &[&str]| line.starts_with("===") && names.iter().any(|name| line.contains(name));
+    let from_first = lines.iter().skip_while(|line| !is_heading(line, &[" FAILURES ", " ERRORS "]));
+    let output: Vec<String> =
+        from_first.take_while(|line| !is_heading(line, &["short test summary"])).cloned().collect();
+    let named = |line: &String| {
+        let rest = line.strip_prefix("FAILED ").or_else(|| line.strip_prefix("ERROR "))?;
+        Some(rest.split(" - ").next()?.rsplit('/').next()?.to_owned())
+    };
+    let names: Vec<String> = lines.iter().filter_map(named).collect();
+    (if names.is_empty() { "pytest ended badly: read the lines above".to_owned() } else { names.join(", ") }, output)
 }
 
 /// Counts one line of `pytest -v`: `FILE::TEST PASSED [ 5%]`.
@@ -230,5 +247,22 @@ mod tests {
         ];
         lines.iter().for_each(|line| count(line, &mut tally));
         assert_eq!((tally.passed, tally.failed, tally.skipped), (1, 1, 1));
+    }
+
+    #[test]
+    fn a_failed_test_is_named_with_what_it_said() {
+        let lines = [
+            "tests/test_a.py::test_two[4-x y] FAILED           [ 10%]",
+            "=================== FAILURES ===================",
+            "_________________ test_two _________________",
+            "E   assert 1 == 2",
+            "=========== short test summary info ============",
+            "SKIPPED [1] tests/test_b.py:3: no fork",
+            "FAILED ../crates/python/tests/test_a.py::test_two[4-x y] - assert 1 == 2",
+        ];
+        let (names, output) = failures(&lines.map(str::to_owned));
+        assert_eq!(names, "test_a.py::test_two[4-x y]");
+        assert_eq!(output, lines[1..4]);
+        assert_eq!(failures(&[]).0, "pytest ended badly: read the lines above");
     }
 }

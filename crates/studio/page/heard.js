@@ -14,7 +14,8 @@ const MOST = 32;
 /** By object, `4:606C:00`: `{ field, node, label, unit, decimals, series }`. */
 const chosen = new Map();
 let after = null;
-let timer = null;
+/** Whether the studio is asked again and again: once at a time, however many objects are added while an answer is awaited. */
+let asks = false;
 
 /** Torque is current by another name. */
 const isCurrent = ({ name, unit }) => /current|torque/i.test(name ?? "") || /\bm?A\b/.test(unit ?? "");
@@ -78,12 +79,12 @@ export function heardChooser() {
     } catch (error) {
       setText(status, error.message);
     }
-    if (timer === null) ask();
+    if (!asks) ask();
   }
 
   async function ask() {
-    timer = null;
-    if (chosen.size === 0) {
+    asks = chosen.size > 0;
+    if (!asks) {
       after = null;
       return;
     }
@@ -98,7 +99,7 @@ export function heardChooser() {
         setText(status, error.message);
       }
     }
-    timer = setTimeout(ask, ASK_MS);
+    setTimeout(ask, ASK_MS);
   }
 
   return { root: h("span", { class: "bar" }, list, shown, status) };

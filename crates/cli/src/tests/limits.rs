@@ -74,7 +74,7 @@ fn what_a_servo_by_the_profile_holds_back_is_refused_before_anything_moves() {
             let ended = bench.run(words);
             assert!(ended.err.contains("by 6080h:00 max_motor_speed = 100"), "{model} {words:?}: {}", ended.err);
         }
-        // At the very bound, which is no whole count: 131072 increments a turn, so 109226.67 of them a second at 50 r/min.
+        // At the very bound, between two counts: 131072 increments a turn, so 109226.67 of them a second at 50 r/min.
         bench.done(&["write", "5", "6080", "50"]);
         bench.done(&["velocity", "5", "50rpm", "--for", "100ms"]);
     }
