@@ -7,6 +7,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use canopen::NodeId;
+use canopen::object::DEVICE_TYPE;
 use cia402::object::{CONTROLWORD, STATUSWORD};
 use cia402::{PowerCommand, PowerState, Statusword};
 use host::network::heard::Counted;
@@ -253,6 +254,22 @@ impl Context {
         if !self.json {
             self.shell.note(text);
         }
+    }
+
+    /// Refuses a node-ID that another device has: two nodes with one node-ID disturb each other.
+    ///
+    /// # Errors
+    /// That it is in use.
+    pub async fn expect_free(&self, new: NodeId) -> Result<(), Failure> {
+        let answer = self.node(new).upload(DEVICE_TYPE).await;
+        // A node that is stopped answers no SDO.
+        if matches!(answer, Err(Error::NoAnswer { .. })) && !self.network.seen().contains(new) {
+            return Ok(());
+        }
+        Err(Failure::new(format!("node-ID {new} is in use: a node {new} is on the bus"))
+            .at_node(new)
+            .because("nothing was set")
+            .next("choose another, or give that node another one first; ferrodrive scan shows the nodes"))
     }
 
     /// A drive that is to be stopped: as what the user takes it for, be that right or wrong. It is not asked first for the record of

@@ -89,6 +89,11 @@ impl Description {
         self.sections.iter().find(|part| (part.from..=part.to).contains(&index)).map(|part| part.section)
     }
 
+    /// The only bit rate that it has: as delivered, where neither an object nor LSS changes it.
+    pub fn only_bitrate(&self) -> Option<Bitrate> {
+        self.bitrate.filter(|_| self.storage.address.len() < 2 && !self.lss)
+    }
+
     /// The first axis; `None` for a device that is not a drive.
     pub const fn first_axis(&self) -> Option<&'static AxisDescription> {
         self.axes.first()
@@ -235,7 +240,7 @@ pub struct ParameterStorage {
     pub save_on_write: Option<(Write, bool)>,
     /// Objects that take effect after a restart only.
     pub effective_after_restart: &'static [Mux],
-    /// Objects that choose its node-ID and bit rate: who writes them has to look for the device elsewhere afterwards.
+    /// Objects that choose its node-ID, the first one, and its bit rate: who writes them has to look for the device elsewhere afterwards.
     pub address: &'static [Mux],
 }
 

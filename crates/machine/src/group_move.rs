@@ -8,7 +8,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use cia402::ModeOfOperation;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, PathError, Phase};
-use master::units::{Along, Angle, Ramp, Rpm, Turns};
+use master::units::{Along, Angle, ParseUnitError, Ramp, Rpm, Turns};
 use master::{Drive, cyclic::CyclicOptions};
 
 use crate::file::{CyclePlan, GROUP_PERIOD, GroupPlan, Machine};
@@ -21,7 +21,7 @@ use words::time::some_time;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroupMove {
     /// Where each axis goes. The others of its group stay where they are.
-    pub targets: Vec<(NodeId, Angle)>,
+    pub targets: Vec<(NodeId, Along<Angle>)>,
     /// By so much from where each axis is, instead of to a position.
     pub relative: bool,
     /// The name of the `[[group]]`; without it, the one that has the nodes.
@@ -75,13 +75,13 @@ pub struct GroupRun {
     pub missed_cycles: u64,
 }
 
-/// An axis and its target: `1=90deg`.
+/// An axis and its target: `1=90deg`, or `1=20mm` behind a gear with a feed.
 ///
 /// # Errors
 /// What is expected.
-pub fn target(text: &str) -> Result<(NodeId, Angle), String> {
+pub fn target(text: &str) -> Result<(NodeId, Along<Angle>), String> {
     let (number, position) = text.split_once('=').ok_or("expected NODE=POSITION, e.g. 1=90deg")?;
-    Ok((node(number)?, angle(position)?))
+    Ok((node(number)?, with_unit(position)?))
 }
 
 /// An angle with its unit: a group is spoken of in degrees, and a number alone would be counts of the drive.
@@ -89,6 +89,10 @@ pub fn target(text: &str) -> Result<(NodeId, Angle), String> {
 /// # Errors
 /// What is expected.
 pub fn angle(text: &str) -> Result<Angle, String> {
+    with_unit(text)
+}
+
+fn with_unit<T: FromStr<Err = ParseUnitError>>(text: &str) -> Result<T, String> {
     let angle = text.parse().map_err(|error| format!("{error}"))?;
     if text.ends_with(|c: char| c.is_ascii_digit() || c == '.') {
         return Err(format!(
@@ -302,7 +306,7 @@ impl GroupMove {
             let limits = self.limits(&drive, said.map(|axis| &axis.limits)).await?;
             let target = self.targets.iter().find(|(node, _)| *node == drive.node().id());
             planned.targets.push(match target {
-                Some((_, angle)) => Some(countable(&drive, *angle, index + 1).await?),
+                Some((_, wish)) => Some(countable(&drive, drive.turning(*wish)?, index + 1).await?),
                 None => None,
             });
             planned.axes.push(AxisSetup { drive, mode, limits });
@@ -421,7 +425,8 @@ mod tests {
         let asked: GroupMove =
             "move by 1=90deg at 60rpm 2=-0.5turn within 3s of arm period 2ms mode ip".parse().unwrap();
         let [one, two] = [1, 2].map(|id| NodeId::new(id).unwrap());
-        assert_eq!(asked.targets, [(one, Angle::Turns(0.25)), (two, Angle::Turns(-0.5))]);
+        let turns = |turns| Along::Turning(Angle::Turns(turns));
+        assert_eq!(asked.targets, [(one, turns(0.25)), (two, turns(-0.5))]);
         assert_eq!((asked.relative, asked.group.as_deref(), asked.velocity), (true, Some("arm"), Some(Rpm(60.0))));
         assert_eq!((asked.within, asked.period), (Some(Duration::from_secs(3)), Some(Duration::from_millis(2))));
         assert_eq!(asked.mode, Some(ModeOfOperation::INTERPOLATED_POSITION));

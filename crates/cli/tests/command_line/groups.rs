@@ -90,6 +90,18 @@ fn a_group_of_the_file_holds_the_axes_that_are_not_named_and_keeps_to_its_softwa
     refused(&["group", "move", &file, "1=90deg", "--within", "10ms"], 1, "give more time, or raise a limit");
 }
 
+/// A screw with a pitch of 5 mm: 20 mm are four turns.
+#[test]
+fn an_axis_with_a_feed_goes_to_a_length() {
+    let folder = processes::scratch("group-feed");
+    let drives = "[[drive]]\nmodel = 'zlim42c'\nnode = 2\nunits = { feed_constant = '5mm' }\n[[drive]]\nmodel = 'm4230e17b50'\nnode = 1\n";
+    let file = folder.write("screw.toml", drives);
+    let moved = done(&["--json", "group", "move", &file, "2=20mm", "1=10deg", "--velocity", "240rpm"]).json();
+    let at = |axis: usize| number(&moved["axes"][axis]["at_deg"]);
+    assert!((at(0) - 4.0 * 360.0).abs() < 2.0 && (at(1) - 10.0).abs() < 1.0, "{moved}");
+    refused(&["group", "move", &file, "1=20mm"], 1, "node 1");
+}
+
 /// M Robot Joint Motor CanOpen Manual, 5.10.3: an interpolation cycle each 2 ms. The ZLAC8030L is moved by speeds.
 #[test]
 fn a_period_in_which_a_joint_does_not_move_evenly_is_said() {

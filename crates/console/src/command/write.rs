@@ -80,6 +80,9 @@ impl Write {
         // Bytes may be a number that means something else on another model.
         drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
         context.note_guess(&drive);
+        if let Some(new) = new_node_id(&drive, mux, &value).filter(|new| *new != self.node) {
+            context.expect_free(new).await?;
+        }
         let mut bytes = value.bytes();
         if bytes.len() > LONG {
             context.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
@@ -94,6 +97,12 @@ impl Write {
         report.file = self.from.as_ref().map(|path| path.display().to_string());
         Ok(report)
     }
+}
+
+/// The node-ID that a drive is given with this value.
+fn new_node_id(drive: &Drive, mux: Mux, value: &Typed) -> Option<NodeId> {
+    let chooses = drive.description()?.storage.address.first()?;
+    value.number().filter(|_| *chooses == mux).and_then(|number| NodeId::new(u8::try_from(number).ok()?))
 }
 
 /// The value of an object that no row is known of: with its type, or of the standard's where the model is not known.

@@ -17,7 +17,7 @@ use machine::file::{GroupPlan, Machine};
 use machine::group_move::{GroupMove, GroupRun, PlannedMove};
 use master::Drive;
 use master::group::{Group, GroupError, Phase, StreamOptions};
-use master::units::{Angle, Turns};
+use master::units::{Along, Angle, Turns};
 use words::failure::Failure;
 
 pub use path::RecordedPath;
@@ -92,7 +92,7 @@ impl GroupFollow {
     /// # Errors
     /// Axes that are not of one group.
     pub fn axes<'a>(&self, machine: Option<&'a Machine>) -> Result<(Vec<NodeId>, Option<&'a GroupPlan>), Failure> {
-        let targets = self.path.nodes().map(|node| (node, Angle::Turns(0.0))).collect();
+        let targets = self.path.nodes().map(|node| (node, Along::Turning(Angle::Turns(0.0)))).collect();
         GroupMove { targets, ..self.options.clone() }.axes(machine)
     }
 
@@ -104,7 +104,7 @@ impl GroupFollow {
     pub async fn plan(&self, plan: Option<&GroupPlan>, drives: Vec<Drive>) -> Result<PlannedFollow, Failure> {
         let relative = self.options.relative;
         let track = Track::of(&self.path, &drives, relative).await?;
-        let targets = track.begin().map(|(node, turns)| (node, Angle::Turns(turns))).collect();
+        let targets = track.begin().map(|(node, turns)| (node, Along::Turning(Angle::Turns(turns)))).collect();
         let start = GroupMove { targets, ..self.options.clone() }.plan(plan, drives.clone()).await?;
         let mut from = Vec::new();
         for drive in &drives {

@@ -17,7 +17,7 @@ use master::Drive;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, StreamOptions};
-use master::units::{Angle, Rpm, Turns};
+use master::units::{Along, Angle, Rpm, Turns};
 
 use crate::answer::Answer;
 use crate::command::{AxisSpeed, BaseJog, GroupCommand, GroupMove};
@@ -256,7 +256,7 @@ async fn move_together(drives: Vec<Drive>, asked: GroupMove) -> GroupOutcome {
         Err(_) => return Err(("malformed", "expected a time above 0 in seconds".into())),
     };
     let asked = group_move::GroupMove {
-        targets: axes.iter().map(|axis| (axis.node, Angle::Turns(axis.degrees / 360.0))).collect(),
+        targets: axes.iter().map(|axis| (axis.node, Along::Turning(Angle::Turns(axis.degrees / 360.0)))).collect(),
         relative,
         within,
         velocity: rpm.map(Rpm),

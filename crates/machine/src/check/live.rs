@@ -5,6 +5,7 @@ use canopen::object::{
     PRODUCT_CODE, REVISION_NUMBER, SERIAL_NUMBER, VENDOR_ID,
 };
 use canopen::{Mux, NodeId};
+use devices::Description;
 use master::boot::Expectation;
 use master::parameters::{Deviation, verify};
 use master::{Error, Network, Node};
@@ -93,7 +94,7 @@ async fn look(
     live.revision_number = number(node, REVISION_NUMBER).await?;
     live.serial_number = number(node, SERIAL_NUMBER).await?;
     live.heartbeat_ms = number(node, PRODUCER_HEARTBEAT_TIME).await?.and_then(|ms| u16::try_from(ms).ok());
-    live.software = text(node, MANUFACTURER_SOFTWARE_VERSION).await?;
+    live.software = software_version(node, place.description).await?;
     let software = number(node, APPLICATION_SOFTWARE_IDENTIFICATION).await?;
     if let Some(expected) = expectation {
         report.rule = "live-identity";
@@ -164,10 +165,15 @@ async fn number(node: &Node, object: Mux) -> Result<Option<u32>, Error> {
         .map(|payload| payload.raw()))
 }
 
-async fn text(node: &Node, object: Mux) -> Result<Option<String>, Error> {
-    let payload = answered(node.upload(object).await)?;
+/// A VISIBLE_STRING (CiA 301, 7.5.2.7), or the number that some have in its place.
+async fn software_version(node: &Node, model: &Description) -> Result<Option<String>, Error> {
+    let object = MANUFACTURER_SOFTWARE_VERSION;
+    let has_number = model.row(object).is_some_and(|row| row.data_type.is_integer());
     let of_bytes = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned();
-    Ok(payload.map(|payload| of_bytes(payload.as_bytes())))
+    let as_number =
+        |bytes: &[u8]| bytes.iter().rev().fold(0_u64, |number, byte| number << 8 | u64::from(*byte)).to_string();
+    let payload = answered(node.upload(object).await)?;
+    Ok(payload.map(|payload| if has_number { as_number(payload.as_bytes()) } else { of_bytes(payload.as_bytes()) }))
 }
 
 fn answered<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {

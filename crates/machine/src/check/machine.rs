@@ -65,6 +65,7 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     for (node, place) in &intended.nodes {
         report.node = Some(*node);
         traps(*node, place, &mut report);
+        bitrate(place, intended.bitrate, &mut report);
     }
     report.node = None;
     radii.iter().for_each(|radius| wheel_radius(*radius, &mut report));
@@ -123,6 +124,18 @@ fn radii(file: &Table<'_>) -> Vec<(Place, f64)> {
         Some((located(&radius), radius.number("").ok()?))
     };
     bodies.iter().chain(&file.get("base")).filter_map(of).collect()
+}
+
+/// A drive that has one bit rate is not on a bus of another.
+fn bitrate(node: &IntendedNode, of_bus: Bitrate, report: &mut Reporter<'_>) {
+    report.rule = "bitrate";
+    let model = node.description;
+    if let Some(only) = model.only_bitrate().filter(|only| *only != of_bus) {
+        let what =
+            format!("the {} has a bit rate of {only} alone ({}), and this bus has {of_bus}", model.title, model.manual);
+        let next = format!("set `bitrate = \"{only}\"` at the top of the file, and the other drives to it");
+        report.say(Severity::Warning, node.at, what, next);
+    }
 }
 
 /// Radii of the wheels of vehicles, in m; one in another unit is outside.

@@ -91,6 +91,23 @@ fn wheels_of_an_unlikely_size_are_named_where_the_file_says_it() {
     }
 }
 
+/// "M Robot Joint Motor CanOpen Manual", Parameters: "rate 1 M", and no object for another; 200Eh of the ZLAC8030L and 2009h of the ZLIM42-C
+/// choose one.
+#[test]
+fn a_joint_is_not_on_a_bus_of_another_bit_rate() {
+    let found = |rate: &str| -> Vec<(Severity, Option<u8>)> {
+        let drives = [("zlac8030l", 4), ("m4230e17b50", 1), ("zlim42c", 2), ("cia402", 5)];
+        let drives = drives.map(|(model, node)| format!("[[drive]]\nmodel = '{model}'\nnode = {node}\n")).concat();
+        let all = of_machine(&format!("{rate}{drives}"), Path::new("")).expect("it is read").findings;
+        let found = all.into_iter().filter(|finding| finding.rule == "bitrate");
+        found.map(|finding| (finding.severity, finding.node)).collect()
+    };
+    assert_eq!(found("bitrate = '1M'\n"), []);
+    for rate in ["bitrate = '500k'\n", ""] {
+        assert_eq!(found(rate), [(Severity::Warning, Some(1))]);
+    }
+}
+
 /// 60FFh of the ZLAC8030L: -1000 to 1000 r/min, in whole r/min by 202Fh:05 as delivered (object table of its manual). A wheel of 84 mm
 /// goes 2 pi 0.084 / 60 = 0.0088 m/s at 1 r/min.
 #[test]

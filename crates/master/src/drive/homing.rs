@@ -39,7 +39,7 @@ const INTENT: &str = "find its reference position";
 impl Drive {
     /// Finds the reference position with a homing method of CiA 402. Enables the drive first; leaves it in mode 6.
     ///
-    /// A drive that does not find it in time is quick-stopped.
+    /// A drive that does not find it in time is quick-stopped; the error says whether it was seen to stand then.
     ///
     /// # Errors
     /// [`Error::NoSuchMode`] for a model without homing; [`Error::NoSuchQuantity`] for a speed where the model has no object for it; [`Error::OutOfLimits`] for a method that it does not have, and
@@ -70,10 +70,13 @@ impl Drive {
             return Ok(MotionReport { reached_after: None, commanded, notes });
         }
         let reached = match self.watch(INTENT, Goal::Home { rules, method, looks: 0 }, options.limit).await {
-            Err(error @ Error::NotReached(_)) => {
-                // The first error is reported, whether or not the stop succeeds.
-                let _ = self.quick_stop().await;
-                return Err(error);
+            Err(Error::NotReached(mut explanation)) => {
+                let stop = match self.quick_stop().await {
+                    Ok(()) => "; it has been quick-stopped and stands".to_owned(),
+                    Err(error) => format!("; it was sent a quick stop and may turn still: {error}"),
+                };
+                explanation.conclusion.push_str(&stop);
+                return Err(Error::NotReached(explanation));
             }
             other => other?,
         };

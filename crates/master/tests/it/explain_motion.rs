@@ -36,6 +36,23 @@ fn after_a_relative_move_the_drive_is_said_to_be_there_and_its_distance_is_not_t
     }
 }
 
+/// 6064h of a stepper without an encoder counts the steps that were made ("ZLIM42-C user manual V1.03": an integrated open-loop stepper).
+#[test]
+fn a_stepper_is_not_said_to_be_where_its_steps_are() {
+    for (name, has_encoder) in [("zlim42c", false), ("zlac8030l", true), ("cia402", true)] {
+        let mut bench = Bench::new(name);
+        if name == "zlac8030l" {
+            bench.write(mux(0x2000, 0), 0);
+        }
+        let drive = bench.drive.clone();
+        bench.done(drive.move_absolute(Turns(0.5), MotionOptions::default()));
+        let explained = bench.explain();
+        let finding = causes(&explained).into_iter().find(|finding| finding.rule == "at_target");
+        let finding = finding.unwrap_or_else(|| panic!("{name}: {explained:?}"));
+        assert_eq!(!format!("{finding:?}").contains("has no encoder"), has_encoder, "{name}: {finding:?}");
+    }
+}
+
 /// M joint manual, 5.11.2: two seconds without the heartbeat of its host stop it with alarm 20h; the next one has it go on. In mode 7
 /// its target is a position.
 #[test]

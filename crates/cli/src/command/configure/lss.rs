@@ -6,7 +6,6 @@ use can::Bitrate;
 use canopen::lss::{
     Address, BIT_RATES_KBIT, Bound, Client, FastScan, Outcome, Part, Reply, Request, Search, UNCONFIGURED,
 };
-use canopen::object::DEVICE_TYPE;
 use canopen::{NmtCommand, NodeId};
 use master::units::parse_duration;
 use serde::Serialize;
@@ -316,20 +315,6 @@ impl LssMaster<'_> {
         Ok(())
     }
 
-    /// Refuses a node-ID that another device has: two nodes with one node-ID disturb each other.
-    async fn is_free(&self, new: NodeId) -> Result<(), Failure> {
-        let network = &self.context.network;
-        let answer = self.context.node(new).upload(DEVICE_TYPE).await;
-        // A node that is stopped answers no SDO.
-        if matches!(answer, Err(master::Error::NoAnswer { .. })) && !network.seen().contains(new) {
-            return Ok(());
-        }
-        Err(Failure::new(format!("node-ID {new} is in use: a node {new} is on the bus"))
-            .at_node(new)
-            .because("nothing was set")
-            .next("choose another, or give that node another one first; ferrodrive scan shows the nodes"))
-    }
-
     async fn scan(&mut self) -> Result<LssReport, Failure> {
         let mut devices = Vec::new();
         self.ask(Request::SwitchGlobal(false)).await;
@@ -450,7 +435,7 @@ impl LssMaster<'_> {
         };
         let wanted = set.node_id.map(|NodeIdArg(node)| NodeId::new(node));
         if let Some(new) = wanted.flatten().filter(|new| before.flatten() != Some(*new)) {
-            self.is_free(new).await?;
+            self.context.expect_free(new).await?;
         }
         if let Some(NodeIdArg(node)) = set.node_id {
             let what = if node == UNCONFIGURED { "no node-ID".to_owned() } else { format!("node-ID {node}") };

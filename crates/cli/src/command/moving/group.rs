@@ -12,7 +12,7 @@ use machine::file::GroupPlan;
 use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, rate, target, turning};
 use master::Drive;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
-use master::units::{Angle, Rpm, Shown, parse_duration};
+use master::units::{Along, Angle, Rpm, Shown, parse_duration};
 use serde::Serialize;
 use words::mode::mode;
 use words::time::some_time;
@@ -62,7 +62,7 @@ enum GroupAction {
 #[command(after_help = "Examples:\n  ferrodrive group move 1=90deg 4=0.5turn --within 3s\n  \
     ferrodrive --bus can0 group move machine.toml 1=90deg 2=-45deg")]
 struct Move {
-    /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 2=-3000counts
+    /// Machine file, and the positions of the nodes: 1=90deg 4=0.5turn 3=20mm 2=-3000counts
     #[arg(value_name = "FILE.toml|NODE=POSITION", required = true, value_parser = word)]
     words: Vec<Argument>,
     /// Duration of the move (default: the shortest within the limits)
@@ -131,7 +131,7 @@ struct GroupOptions {
 #[derive(Clone, Debug)]
 enum Argument {
     File(PathBuf),
-    Target(NodeId, Angle),
+    Target(NodeId, Along<Angle>),
 }
 
 fn word(text: &str) -> Result<Argument, String> {

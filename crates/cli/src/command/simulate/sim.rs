@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use can::{Bitrate, Instant};
 use canopen::Mux;
+use devices::variant::Preset;
 use serve::eeprom::Eeproms;
 use serve::messages::Messages;
 use serve::pacer::{Clock, Pacer, Speed};
@@ -378,6 +379,7 @@ fn add_drive(
         })?;
     }
     if image.is_some() {
+        note_presets_without_effect(&order.presets, &name, warnings);
         note_what_the_image_changes(drive.clone(), world.bitrate(), number, &name, warnings);
     }
     world.add_drive(number, drive).map_err(|error| {
@@ -388,6 +390,17 @@ fn add_drive(
 
 fn unusable(bad: BadFile) -> Failure {
     Failure::bad_file("cannot use the machine file").because(bad).next("docs/machine-file.md describes each key")
+}
+
+/// Says it if values were given for a drive that has its EEPROM contents.
+pub(crate) fn note_presets_without_effect(presets: &[Preset], name: &str, warnings: &Messages) {
+    let objects: Vec<String> = presets.iter().map(|preset| preset.object.to_string()).collect();
+    if !objects.is_empty() {
+        warnings.say(&format!(
+            "note: {name} has its EEPROM contents: what is given for {} has no effect; to begin with that, move its file out of --state",
+            objects.join(", ")
+        ));
+    }
 }
 
 /// Says it if a drive is not where the command line puts it, because its EEPROM contents say otherwise.

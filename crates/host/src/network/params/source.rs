@@ -51,6 +51,9 @@ pub fn of_machine(machine: &Machine, node: NodeId) -> Result<(Parameters, String
     Ok((found, MACHINE_FILE.to_owned()))
 }
 
+/// How many values that a node cannot have are named.
+const SHOWN: usize = 10;
+
 /// A refusal before anything was written.
 pub fn refused(error: PlanError) -> Failure {
     match error {
@@ -79,8 +82,13 @@ pub fn refused(error: PlanError) -> Failure {
             let failure = Failure::new(format!("node {node} cannot have {objects} of the file; nothing was written"));
             let failure = failure.of_kind("unfit_parameters").at_node(node);
             let first = unfit.first().map(Unfit::object);
-            let failure = unfit.iter().fold(failure, |failure, unfit| failure.because(unfit));
-            let failure = failure.next("correct these values, or take them out of the file");
+            let failure = unfit.iter().take(SHOWN).fold(failure, |failure, unfit| failure.because(unfit));
+            let failure = match unfit.len().saturating_sub(SHOWN) {
+                0 => failure.next("correct these values, or take them out of the file"),
+                more => failure
+                    .because(format!("and {more} more"))
+                    .next("check whether the file is that of another model; if it is not, correct these values"),
+            };
             match first {
                 Some(object) => failure.at_object(object),
                 None => failure,

@@ -148,16 +148,7 @@ fn position(seen: &Observed) -> Option<Finding> {
         return Some(relative_reached(seen, &object, found));
     }
     if !relative && target.abs_diff(at) <= window as u64 {
-        return Some(cause(
-            TOPIC,
-            "at_target",
-            [
-                format!("A target elsewhere in {object}"),
-                format!("Target {target}, position {at} counts"),
-                "The drive is where it is commanded to be".to_owned(),
-                "Write another target, then start it with controlword bit 4".to_owned(),
-            ],
-        ));
+        return Some(at_target(seen, &object, format!("Target {target}, position {at} counts")));
     }
     let handshake = seen.axis.is_none_or(|axis| axis.new_set_point == NewSetPoint::Handshake);
     let asked = controlword.has(Controlword::NEW_SET_POINT);
@@ -190,6 +181,27 @@ fn position(seen: &Observed) -> Option<Finding> {
             ],
         )
     })
+}
+
+/// The position of a stepper without an encoder is that of its steps, whether its shaft has followed them or not.
+fn at_target(seen: &Observed, object: &str, found: String) -> Finding {
+    let (is, next) = match seen.axis.and_then(|axis| axis.open_loop.as_ref()) {
+        None => ("The drive is where it is commanded to be", ""),
+        Some(_) => (
+            "The drive has made the steps to it; it has no encoder, and does not notice steps that its shaft has lost",
+            "; if the shaft is elsewhere, it has lost steps: home it, and give it a softer ramp or more current",
+        ),
+    };
+    cause(
+        TOPIC,
+        "at_target",
+        [
+            format!("A target elsewhere in {object}"),
+            found,
+            is.to_owned(),
+            format!("Write another target, then start it with controlword bit 4{next}"),
+        ],
+    )
 }
 
 /// After a relative move 607Ah still has its distance: whether that has been gone or is yet to be started does not show, and to start it
