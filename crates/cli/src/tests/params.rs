@@ -27,6 +27,15 @@ fn a_refusal_at_the_third_value_puts_the_first_two_back() {
 }
 
 #[test]
+fn values_of_another_model_are_counted_and_the_first_ones_named() {
+    let (bench, folder) = (bench(), scratch("params_other_model"));
+    let values: Vec<String> = (0x3000..0x3019).map(|index| format!("\"{index:X}\" = \"u16:1\"\n")).collect();
+    let error = bench.run(&["params", "apply", "4", &folder.values("other.toml", &values.concat())]).err;
+    assert!(error.contains("cannot have 25 values") && error.contains("3009h") && !error.contains("300Ah"), "{error}");
+    assert!(error.contains("and 15 more") && error.contains("another model"), "{error}");
+}
+
+#[test]
 fn a_drive_at_work_is_left_alone_and_the_way_out_is_said() {
     let (bench, folder) = (bench(), scratch("params_at_work"));
     let file = folder.values("wanted.toml", "1017 = 200\n");

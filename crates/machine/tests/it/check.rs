@@ -367,6 +367,8 @@ fn live_drives_are_only_read() {
         (live[0].vendor_id, live[0].product_code, live[0].device_type),
         (Some(0x100), Some(1), Some(0x0004_0192))
     );
+    // An UNSIGNED16 there ("ZLAC8030L quick start guide V1.00", object table), and a VISIBLE_STRING in CiA 301.
+    assert!(live[0].software.as_ref().is_some_and(|version| version.parse::<u16>().is_ok()), "{live:?}");
     let asked: Vec<_> = frames.iter().filter(|frame| frame.starts_with("604#")).collect();
     // CiA 301, 7.2.4.3.5: an initiate upload, or a segment of one (60h, 70h); nothing else but answers and heartbeats.
     let reads = |frame: &&String| ["604#40", "604#60", "604#70"].iter().any(|read| frame.starts_with(read));
