@@ -69,6 +69,20 @@ fn the_dcf_of_a_manager_says_who_is_booted_and_as_what() {
     assert!(ended.status == Some(1) && ended.err.contains("node 4, is not whole"), "{}", ended.err);
 }
 
+/// The joint watches for heartbeats of node 127, which are not sent after a boot (M joint manual, 5.11); the ZLAC8030L stops after a
+/// second of silence (2000h), and the ZLIM42-C watches nothing.
+#[test]
+fn a_watch_that_nothing_arms_is_not_passed() {
+    let booted = ferrodrive(&["boot", "--json"]).json();
+    let verdict = |node: u64| {
+        let nodes = booted["nodes"].as_array().expect("nodes");
+        let of_node = nodes.iter().find(|found| found["node"] == node).expect("the node");
+        let steps = of_node["steps"].as_array().expect("steps");
+        steps.iter().find(|step| step["step"] == "host watch").expect("the step")["verdict"].clone()
+    };
+    assert_eq!([1, 2, 4].map(verdict), ["noted", "noted", "passed"], "{booted}");
+}
+
 #[test]
 fn a_machine_file_that_is_cut_short_is_refused_with_its_line_before_the_bus() {
     let folder = scratch("boot_half");

@@ -176,6 +176,11 @@ fn a_joint_homes_on_the_switch_of_its_machine_file() {
     let bus = format!("sim:{}", file.display());
     let homed = done(&["--bus", &bus, "--json", "home", "1", "--method", "17"]).json();
     assert_eq!(homed["reached"], true);
+    // A joint has its speed of the search in 6083h, and those of moves do not count.
+    assert!(
+        homed["limits"]["profile_velocity_rpm"].is_null() && homed["limits"]["search_speed_rpm"].is_null(),
+        "{homed}"
+    );
     assert!(homed["bits"].as_array().unwrap().contains(&json!("homing attained")), "{homed}");
 }
 
@@ -184,6 +189,14 @@ fn homing_that_finds_nothing_in_time_is_reported_with_what_to_check() {
     let ended = ferrodrive(&["home", "2", "--method", "17", "--within", "2s"]);
     assert_eq!(ended.status, Some(1));
     assert!(ended.err.contains("still looks for its reference") && ended.err.contains("switch"), "{}", ended.err);
+    assert!(ended.err.contains("it has been quick-stopped and stands"), "{}", ended.err);
+    // 6099h:01 of the ZLIM42-C is 120 r/min as delivered ("ZLIM42-C user manual V1.03", 5.4).
+    let begun = done(&["--json", "home", "2", "--method", "17", "--no-wait"]).json();
+    assert_eq!(begun["limits"]["search_speed_rpm"], 120.0, "{begun}");
+    assert!(
+        begun["limits"]["profile_velocity_rpm"].is_null() && begun["limits"]["acceleration_ms"].is_null(),
+        "{begun}"
+    );
     assert_eq!(ferrodrive(&["home", "2", "--method", "99"]).status, Some(1));
 }
 

@@ -354,6 +354,22 @@ fn a_shaft_is_moved_along_the_position_of_a_capture_and_one_of_another_drive_is_
 }
 
 #[test]
+fn options_of_tune_that_have_no_effect_on_a_drive_are_refused() {
+    for (node, option, value) in [
+        ("2", "--loop", "position"),
+        ("2", "--current", "3A"),
+        ("2", "--bandwidth", "20"),
+        ("2", "--travel", "3turn"),
+        ("4", "--load-inertia", "3e-5"),
+        ("4", "--ramp", "200ms"),
+    ] {
+        let ended = ferrodrive(&["tune", node, option, value]);
+        assert_eq!(ended.status, Some(2), "{option}: {}", ended.out);
+        assert!(ended.err.contains(&format!("{option} has no effect on a")), "{}", ended.err);
+    }
+}
+
+#[test]
 fn a_tuning_and_a_test_motion_are_in_the_report_of_their_node() {
     let place = scratch("tuned-report");
     let [tune, step, page, picture] = ["tune.json", "step.mcap", "page.html", "tune.svg"].map(|name| place.path(name));

@@ -171,6 +171,9 @@ struct ProfileLimits {
     /// Where it turns at a speed: the highest that acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     velocity_rpm: Option<f64>,
+    /// Of a homing: the first speed at which the switch is looked for, where it has an object of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    search_speed_rpm: Option<f64>,
     acceleration_ms: Option<f64>,
     deceleration_ms: Option<f64>,
     quick_stop_ms: Option<f64>,
@@ -181,6 +184,8 @@ struct ProfileLimits {
     current_a: Option<f64>,
     #[serde(skip)]
     is_torque: bool,
+    #[serde(skip)]
+    is_homing: bool,
 }
 
 impl Velocity {
@@ -374,6 +379,13 @@ async fn limits(drive: &Drive) -> ProfileLimits {
         let current_a = limit.map(|Amperes(current)| current);
         return ProfileLimits { current_a, is_torque: true, ..ProfileLimits::default() };
     }
+    if mode == Some(ModeOfOperation::HOMING) {
+        let search_speed_rpm = match axis.homing.and_then(|rules| rules.search_speed) {
+            Some(search) => drive.read_quantity(search).await.ok(),
+            None => None,
+        };
+        return ProfileLimits { search_speed_rpm, is_homing: true, ..ProfileLimits::default() };
+    }
     // The profile velocity is that of moves to a position.
     let limits = match (mode, axis.units.profile_velocity, axis.units.target_velocity) {
         (Some(ModeOfOperation::PROFILE_VELOCITY | ModeOfOperation::VELOCITY), _, Some(target)) => {
@@ -414,11 +426,13 @@ impl ProfileLimits {
         let parts = [
             self.velocity_rpm.map(|rpm| format!("speed up to {} r/min", Shown(rpm))),
             self.profile_velocity_rpm.map(|rpm| format!("profile velocity {} r/min", Shown(rpm))),
+            self.search_speed_rpm.map(|rpm| format!("search speed {} r/min", Shown(rpm))),
             self.acceleration_ms.map(|ms| format!("acceleration {ms:.0} ms")),
             self.deceleration_ms.map(|ms| format!("deceleration {ms:.0} ms")),
             self.quick_stop_ms.map(|ms| format!("quick stop {ms:.0} ms")),
             self.acceleration_rpm_s.map(|rate| format!("acceleration {} (r/min)/s", Shown(rate))),
             self.current_a.map(|current| format!("current {} A", Shown(current))),
+            self.is_homing.then(|| "ramps of the drive's homing".to_owned()),
             self.is_torque.then(|| "the speed is as the load lets it".to_owned()),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")

@@ -62,7 +62,7 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "HZ", conflicts_with = "phase_margin")]
     bandwidth: Option<f64>,
     /// Objective: phase margin to keep, in degrees
-    #[arg(long, value_name = "DEGREES", default_value = "40")]
+    #[arg(long, value_name = "DEGREES", default_value_t = PHASE_MARGIN_DEG)]
     phase_margin: f64,
     /// Highest speed of the motor's shaft (default: what is usual)
     ///
@@ -101,7 +101,7 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "NM", default_value = "0", allow_negative_numbers = true, hide_short_help = true)]
     load_torque: f64,
     /// Of a stepper: how many times the torque that is needed there is to be
-    #[arg(long, value_name = "TIMES", default_value = "1.5", hide_short_help = true)]
+    #[arg(long, value_name = "TIMES", default_value_t = MARGIN, hide_short_help = true)]
     margin: f64,
     /// Of a stepper: time in which it is to reach the speed (default: the shortest that keeps the margin)
     #[arg(long, value_name = "TIME", value_parser = parse_duration, hide_short_help = true)]
@@ -119,6 +119,20 @@ pub(crate) struct Tune {
     cycles: CycleArgs,
     #[command(flatten)]
     guard: GuardArgs,
+}
+
+/// What is usual of the options that not every drive has.
+const PHASE_MARGIN_DEG: f64 = 40.0;
+const TRAVEL_TURNS: f64 = 40.0;
+const PERIOD: Duration = Duration::from_millis(1);
+const MARGIN: f64 = 1.5;
+
+/// Refuses the first of these options that is given.
+fn without_effect(options: &[(&str, bool)], on: &str, why: &str) -> Result<(), Failure> {
+    match options.iter().find(|(_, is_given)| *is_given) {
+        Some((name, _)) => Err(Failure::usage(format!("{name} has no effect on {on}")).because(why).next("omit it")),
+        None => Ok(()),
+    }
 }
 
 /// An angle in turns, which a number alone is too.
@@ -189,16 +203,13 @@ impl Tune {
         let drive = context.known_drive(self.node).await?;
         let journal = (!context.is_embedded()).then(|| default_path(self.node));
         if host::tune::open_loop_of(&drive).is_some() {
-            if self.output.is_some() {
-                return Err(Failure::usage("--output has no effect on a stepper without an encoder")
-                    .because("its ramps are computed, and there is no frequency response to draw")
-                    .next("omit it"));
-            }
+            self.refuse_options_of_loops()?;
             let request = self.ramp_request(journal);
             let found = TuneResult::Ramps(host::tune::tune_ramps(&drive, &request, &context.progress).await?);
             return Ok(Tuned { found, picture: None });
         }
         let (_, loops) = host::tune::loops_of(&drive)?;
+        self.refuse_options_of_steppers()?;
         let request = self.request(journal, (loops.usual_rpm, loops.usual_a));
         let guard = self.guard.begin(context, &drive).await?;
         let restorer = host::capture::Restorer::of(&drive);
@@ -212,6 +223,32 @@ impl Tune {
         released?;
         let picture = self.draw(&report.picture)?;
         Ok(Tuned { found: TuneResult::Gains(Box::new(report)), picture })
+    }
+
+    fn refuse_options_of_loops(&self) -> Result<(), Failure> {
+        let given = [
+            ("--output", self.output.is_some()),
+            ("--loop", self.which == WhichLoop::Position),
+            ("--bandwidth", self.bandwidth.is_some()),
+            ("--phase-margin", self.phase_margin != PHASE_MARGIN_DEG),
+            ("--current", self.current.is_some()),
+            ("--travel", self.travel != TRAVEL_TURNS),
+            ("--period", self.period != PERIOD),
+            ("--torque-constant", self.torque_constant.is_some()),
+        ];
+        let why = "its ramps are computed: it is not turned, and has no loops and no frequency response";
+        without_effect(&given, "a stepper without an encoder", why)
+    }
+
+    fn refuse_options_of_steppers(&self) -> Result<(), Failure> {
+        let given = [
+            ("--load-inertia", self.load_inertia != 0.0),
+            ("--load-friction", self.load_friction != 0.0),
+            ("--load-torque", self.load_torque != 0.0),
+            ("--margin", self.margin != MARGIN),
+            ("--ramp", self.ramp.is_some()),
+        ];
+        without_effect(&given, "a drive with loops", "its load is measured")
     }
 
     fn of_capture(&self, path: &Path, context: &Context) -> Result<Tuned, Failure> {

@@ -1,6 +1,6 @@
 //! `ferrodrive replay`: the frames of a log, replayed with their original timing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -85,15 +85,17 @@ impl FromStr for Which {
     }
 }
 
+/// A frame that masters send.
+fn is_of_master(frame: &Frame) -> bool {
+    use Service::{LssMaster, Nmt, Rpdo, SdoRequest, Sync, Time};
+    matches!(Service::of(frame.id()), Some(Nmt | Sync | Time | Rpdo(..) | SdoRequest(_) | LssMaster))
+}
+
 impl Which {
     fn takes(&self, record: &Record, frame: &Frame) -> bool {
-        let of_master = || {
-            use Service::{LssMaster, Nmt, Rpdo, SdoRequest, Sync, Time};
-            matches!(Service::of(frame.id()), Some(Nmt | Sync | Time | Rpdo(..) | SdoRequest(_) | LssMaster))
-        };
         match self {
-            Self::Master => of_master(),
-            Self::Nodes => !of_master(),
+            Self::Master => is_of_master(frame),
+            Self::Nodes => !is_of_master(frame),
             Self::Sent => record.direction == Some(Direction::Transmitted),
             Self::Received => record.direction == Some(Direction::Received),
             Self::Ids(first, last) => (*first..=*last).contains(&frame.id().raw()),
@@ -139,6 +141,8 @@ pub(crate) struct ReplayReport {
     motion_sent: u64,
     /// Places of the log that could not be read, error frames and CAN FD frames.
     passed_over: u64,
+    /// Nodes that are on the bus themselves, and whose frames were sent.
+    sent_for: Vec<u8>,
     /// From the first frame to the last, as they were sent.
     took_s: f64,
 }
@@ -159,6 +163,8 @@ struct Frames<'a> {
 struct Next {
     at: Instant,
     frame: Frame,
+    /// The node that sends it, where that is not a master.
+    of: Option<NodeId>,
     moves: Option<(&'static str, Option<NodeId>)>,
 }
 
@@ -181,7 +187,8 @@ impl Frames<'_> {
                 continue;
             }
             let moves = decoded.may_move().map(|why| (why, decoded.may_move_node()));
-            return Ok(Some(Next { at: record.at.unwrap_or(Instant::ZERO), frame, moves }));
+            let of = decoded.node().filter(|_| !is_of_master(&frame));
+            return Ok(Some(Next { at: record.at.unwrap_or(Instant::ZERO), frame, of, moves }));
         }
         if self.is_garbage && self.passed_over > 0 {
             return Err(no_log(self.path, self.reader.format()));
@@ -199,8 +206,8 @@ impl Replay {
         let mut frames = self.frames(context)?;
         let mut report = ReplayReport { file: self.file.display().to_string(), ..ReplayReport::default() };
         let begin = context.network.now();
-        let mut first = None;
-        while let Some(Next { at, frame, moves }) = frames.next()? {
+        let (mut first, mut sent_for) = (None, BTreeSet::new());
+        while let Some(Next { at, frame, of, moves }) = frames.next()? {
             if moves.is_some() && self.skip_motion {
                 report.motion_skipped += 1;
                 continue;
@@ -214,12 +221,15 @@ impl Replay {
                 nodes.into_iter().for_each(|node| context.network.note_moved(node, CONTROLWORD));
             }
             context.network.transmit(frame);
+            sent_for.extend(of);
             report.sent += 1;
             context.progress.show(format!("{} frames sent", report.sent));
         }
         context.settle().await;
         report.took_s = (context.network.now() - begin).as_secs_f64();
         (report.not_chosen, report.passed_over) = (frames.not_chosen, frames.passed_over);
+        let seen = context.network.seen();
+        report.sent_for = sent_for.into_iter().filter(|node| seen.contains(*node)).map(NodeId::raw).collect();
         if report.motion_sent > 0 {
             context.warn(
                 "frames that move drives were sent: drives in motion keep moving; ferrodrive quick-stop NODE stops one",
@@ -300,7 +310,7 @@ impl Replay {
 
 impl Report for ReplayReport {
     fn text(&self, paint: Paint) -> String {
-        let Self { file, sent, not_chosen, motion_skipped, motion_sent, passed_over, took_s } = self;
+        let Self { file, sent, not_chosen, motion_skipped, motion_sent, passed_over, sent_for, took_s } = self;
         let mut text = format!("{} of {file} sent in {took_s:.3} s", paint.strong(&counted(*sent, "frame")));
         for (count, what) in [
             (motion_sent, "of them may move a drive"),
@@ -311,6 +321,15 @@ impl Report for ReplayReport {
             if *count > 0 {
                 text.push_str(&format!("; {count} {what}"));
             }
+        }
+        if !sent_for.is_empty() {
+            let nodes: Vec<_> = sent_for.iter().map(u8::to_string).collect();
+            let twice = format!(
+                "frames of node {} were sent, which is on the bus itself: two senders of one identifier disturb each other, and \
+                 requests have two answers; --only master leaves them out",
+                nodes.join(", ")
+            );
+            text.push_str(&format!("\n{}", paint.bad(&twice)));
         }
         text
     }
