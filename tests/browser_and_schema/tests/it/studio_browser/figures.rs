@@ -25,7 +25,14 @@ const OBJECTS: [&str; 4] = ["6064:00", "606C:00", "6077:00", "6041:00"];
 const COUNT_FRAMES: &str = "window.frames_ = 0; window.drawn = 0; \
     const count = () => { window.frames_ += 1; requestAnimationFrame(count); }; count(); \
     const pen = CanvasRenderingContext2D.prototype; const clear = pen.clearRect; \
+    performance.setResourceTimingBufferSize(5000); performance.clearResourceTimings(); \
     pen.clearRect = function (...area) { window.drawn += 1; clear.apply(this, area); };";
+
+/// In the page: how many requests for what has passed since the one before began while another was on its way, of those from
+/// [`COUNT_FRAMES`] on.
+const SERIES_AT_ONCE: &str = "const asked = performance.getEntriesByType('resource').filter(({ name }) => /api\\/series.*after=/.test(name)); \
+    asked.sort((one, other) => one.startTime - other.startTime); \
+    return asked.length < 2 ? null : asked.filter((one, at) => at && one.startTime < asked[at - 1].responseEnd).length;";
 
 /// From the beginning of the page's loading, in ms.
 const FIRST_PICTURE: &str = "return performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? null";
@@ -168,6 +175,7 @@ async fn figures_of_twelve_objects_a_thousand_times_a_second() {
     );
     assert!(picture_ms > 0.0 && pictures_per_s > 0.0, "it draws");
     stage.shoot("figures").await;
+    assert_eq!(number(&stage, SERIES_AT_ONCE).await, 0.0, "one request at a time, for all objects");
     until_every_object_is_saved(&stage).await;
     let is_reported = stage.client.find(Locator::XPath("//*[contains(., 'are not drawn')]")).await;
     println!("frames that were too many: {}", is_reported.is_ok());
