@@ -245,6 +245,14 @@ pub struct ParameterStorage {
 }
 
 impl ParameterStorage {
+    /// The write with which it stores each further one by itself, where it is delivered so.
+    pub const fn stores_each_write(&self) -> Option<Write> {
+        match self.save_on_write {
+            Some((write, true)) => Some(write),
+            _ => None,
+        }
+    }
+
     /// None: nothing is kept without supply.
     pub const NONE: Self = Self {
         save: None,

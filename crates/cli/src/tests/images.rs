@@ -62,7 +62,6 @@ fn a_drive_that_its_image_puts_elsewhere_is_said_at_the_start() {
     let said = String::from_utf8(paper.0.lock().expect("no thread panicked").clone()).expect("text");
     assert!(said.contains("zlac8030l@4 is off the bus: its EEPROM contents say 250k, and the bus has 500k"), "{said}");
     assert!(said.contains("zlac8030l@4 is node 9 on the bus"), "{said}");
-    assert!(!said.contains("have no effect"), "{said}");
 }
 
 #[test]

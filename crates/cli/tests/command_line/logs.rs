@@ -123,9 +123,9 @@ fn a_replay_says_what_may_move_a_drive_before_it_sends_anything() {
     assert_eq!(count(&["--only", "received"], "sent"), 1, "what is not chosen needs no leave");
     assert_eq!(count(&["--only", "604", "--skip-motion"], "not_chosen"), 2);
     assert_eq!(count(&["--allow-motion", "--only", "sent"], "motion_sent"), 2);
-    // Node 4 is on this bus, and sends its heartbeat itself.
+    // Node 4 is on this bus, and answers the read itself.
     let twice = done(&["replay", log, "--skip-motion"]).out;
-    assert!(twice.contains("frames of node 4 were sent, which is on the bus itself"), "{twice}");
+    assert!(twice.contains("in the name of nodes that are on the bus themselves (4)"), "{twice}");
     let sent =
         |only: &str| done(&["--json", "replay", log, "--skip-motion", "--only", only]).json()["sent_for"].clone();
     assert_eq!(sent("604,704"), serde_json::json!([4]));

@@ -160,7 +160,7 @@ async fn after_reset(bench: &mut Bench) -> Verdict {
     bench.reset(NmtCommand::ResetCommunication).await?;
     let says = bench.number(PERIOD).await?;
     // Some devices store each write by themselves.
-    let keeps = bench.subject.description.storage.save_on_write.is_some_and(|(_, delivered)| delivered);
+    let keeps = bench.subject.description.storage.stores_each_write().is_some();
     if says != stored && !(keeps && says == i64::from(other)) {
         fail!("1017h was {stored} after a reset, got {other} and is {says} after another reset");
     }

@@ -45,7 +45,7 @@ async fn initialisation(bench: &mut Bench) -> Verdict {
     bench.write(mux, &other).await?;
     bench.reset(NmtCommand::ResetNode).await?;
     let after = bench.read(mux).await?;
-    let keeps = bench.subject.description.storage.save_on_write.is_some_and(|(_, delivered)| delivered);
+    let keeps = bench.subject.description.storage.stores_each_write().is_some();
     if after != stored && !(keeps && row.is_kept()) {
         fail!(
             "{mux} was {}, got {} without being stored, and is {} after a reset",

@@ -80,14 +80,15 @@ impl Write {
         // Bytes may be a number that means something else on another model.
         drive.check_write(mux, value.number().unwrap_or_else(|| low_bytes(&value.bytes())))?;
         context.note_guess(&drive);
-        if let Some(new) = new_node_id(&drive, mux, &value).filter(|new| *new != self.node) {
+        let is_written = context.in_control().is_some();
+        if let Some(new) = new_node_id(&drive, mux, &value).filter(|new| *new != self.node && !is_written) {
             context.expect_free(new).await?;
         }
         let mut bytes = value.bytes();
         if bytes.len() > LONG {
             context.show(format!("node {}: writing {} bytes to {mux}", self.node, bytes.len()));
         }
-        if context.in_control().is_some() {
+        if is_written {
             bytes = drive.node().upload(mux).await?.as_bytes().to_vec();
         } else if let Err(error) = drive.node().download(mux, &bytes).await {
             return Err(with_limits(&drive, error, value.number()).await);
@@ -142,7 +143,7 @@ fn note(drive: &Drive, mux: Mux, number: Option<i64>, limits: Option<&Limits>) -
     let storage = drive.description().map(|profile| profile.storage);
     if storage.is_some_and(|storage| storage.effective_after_restart.contains(&mux)) {
         let node = drive.node().id();
-        if let Some((by_itself, true)) = storage.and_then(|storage| storage.save_on_write) {
+        if let Some(by_itself) = storage.and_then(|storage| storage.stores_each_write()) {
             let (object, value) = (by_itself.object, by_itself.value);
             return Some(format!(
                 "it takes effect at the next restart; it is stored by then while {object} is {value}, as delivered, else: ferrodrive save {node}"

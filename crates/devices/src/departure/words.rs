@@ -238,7 +238,7 @@ fn write_modes(f: &mut fmt::Formatter<'_>, modes: &[ModeOfOperation]) -> fmt::Re
 }
 
 fn write_storage(f: &mut fmt::Formatter<'_>, storage: &ParameterStorage) -> fmt::Result {
-    let ParameterStorage { save, restore, save_on_write, .. } = storage;
+    let ParameterStorage { save, restore, .. } = storage;
     match save {
         Some(Write { object, value }) => write!(f, "store with {value} to {object}")?,
         None => f.write_str("nothing is stored: write parameters at each start")?,
@@ -249,7 +249,7 @@ fn write_storage(f: &mut fmt::Formatter<'_>, storage: &ParameterStorage) -> fmt:
             write!(f, " to {object}")?;
         }
     }
-    if let Some((Write { object, value }, true)) = save_on_write {
+    if let Some(Write { object, value }) = storage.stores_each_write() {
         write!(f, "; as delivered each write is stored ({object} = {value})")?;
     }
     Ok(())

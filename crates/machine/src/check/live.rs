@@ -168,12 +168,11 @@ async fn number(node: &Node, object: Mux) -> Result<Option<u32>, Error> {
 /// A VISIBLE_STRING (CiA 301, 7.5.2.7), or the number that some have in its place.
 async fn software_version(node: &Node, model: &Description) -> Result<Option<String>, Error> {
     let object = MANUFACTURER_SOFTWARE_VERSION;
-    let has_number = model.row(object).is_some_and(|row| row.data_type.is_integer());
+    if model.row(object).is_some_and(|row| row.data_type.is_integer()) {
+        return Ok(number(node, object).await?.map(|version| version.to_string()));
+    }
     let of_bytes = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned();
-    let as_number =
-        |bytes: &[u8]| bytes.iter().rev().fold(0_u64, |number, byte| number << 8 | u64::from(*byte)).to_string();
-    let payload = answered(node.upload(object).await)?;
-    Ok(payload.map(|payload| if has_number { as_number(payload.as_bytes()) } else { of_bytes(payload.as_bytes()) }))
+    Ok(answered(node.upload(object).await)?.map(|payload| of_bytes(payload.as_bytes())))
 }
 
 fn answered<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {

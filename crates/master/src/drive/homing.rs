@@ -12,7 +12,7 @@ use devices::{HomingRules, HomingStart};
 use super::goal::Goal;
 use super::handle::Drive;
 use super::motion::{MotionReport, Note};
-use crate::error::Error;
+use crate::error::{Error, Fact};
 use crate::units::Rpm;
 
 const ENABLED: u16 = 0x0F;
@@ -72,10 +72,13 @@ impl Drive {
         let reached = match self.watch(INTENT, Goal::Home { rules, method, looks: 0 }, options.limit).await {
             Err(Error::NotReached(mut explanation)) => {
                 let stop = match self.quick_stop().await {
-                    Ok(()) => "; it has been quick-stopped and stands".to_owned(),
-                    Err(error) => format!("; it was sent a quick stop and may turn still: {error}"),
+                    Ok(()) => "; it has been quick-stopped and stands",
+                    Err(error) => {
+                        explanation.facts.push(Fact::Failed(Box::new(error)));
+                        "; it was sent a quick stop, and was not seen to stand"
+                    }
                 };
-                explanation.conclusion.push_str(&stop);
+                explanation.conclusion.push_str(stop);
                 return Err(Error::NotReached(explanation));
             }
             other => other?,

@@ -123,7 +123,6 @@ pub(crate) struct Tune {
 
 /// What is usual of the options that not every drive has.
 const PHASE_MARGIN_DEG: f64 = 40.0;
-const TRAVEL_TURNS: f64 = 40.0;
 const PERIOD: Duration = Duration::from_millis(1);
 const MARGIN: f64 = 1.5;
 
@@ -232,7 +231,7 @@ impl Tune {
             ("--bandwidth", self.bandwidth.is_some()),
             ("--phase-margin", self.phase_margin != PHASE_MARGIN_DEG),
             ("--current", self.current.is_some()),
-            ("--travel", self.travel != TRAVEL_TURNS),
+            ("--travel", self.travel != Bounds::default().travel_turns),
             ("--period", self.period != PERIOD),
             ("--torque-constant", self.torque_constant.is_some()),
         ];

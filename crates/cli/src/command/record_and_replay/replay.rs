@@ -325,8 +325,8 @@ impl Report for ReplayReport {
         if !sent_for.is_empty() {
             let nodes: Vec<_> = sent_for.iter().map(u8::to_string).collect();
             let twice = format!(
-                "frames of node {} were sent, which is on the bus itself: two senders of one identifier disturb each other, and \
-                 requests have two answers; --only master leaves them out",
+                "frames were sent in the name of nodes that are on the bus themselves ({}): two senders of one identifier disturb each \
+                 other, and requests have two answers; --only master leaves them out",
                 nodes.join(", ")
             );
             text.push_str(&format!("\n{}", paint.bad(&twice)));

@@ -116,8 +116,8 @@ impl Transaction {
                 "{object} had the wanted value, and has {found} after all writes: writing another object changed it"
             ));
         }
-        let by_itself = model.and_then(|model| model.storage.save_on_write);
-        if let Some((write, true)) = by_itself.filter(|_| applied.writes > 0 && !self.save) {
+        let by_itself = model.and_then(|model| model.storage.stores_each_write());
+        if let Some(write) = by_itself.filter(|_| applied.writes > 0 && !self.save) {
             let (object, value) = (write.object, write.value);
             report.notes.push(format!("the drive stores each write by itself while {object} is {value}, as delivered"));
         }
