@@ -1,7 +1,7 @@
 //! The closed form of a current loop beside the formulas of a winding.
 
 use plant::angle::Axis;
-use plant::current_loop::CurrentLoop;
+use plant::current_loop::{CurrentLoop, KnownMotor};
 use plant::hub_motor::HubMotorModel;
 use plant::pmsm::{Dq, PmsmData, PmsmInput, PmsmModel, PmsmOutput, Terminals};
 
@@ -50,6 +50,23 @@ fn a_loop_that_cancels_the_windings_pole_is_of_first_order_at_any_bandwidth() {
             assert!((mean_a - mean).abs() < 1e-9, "{bandwidth}, step {n}: {mean_a} A in the mean");
         }
         assert!(!data.current_loop.saturated && data.current_a.d == 0.0);
+    }
+}
+
+#[test]
+fn a_loop_that_knows_its_motor_is_of_first_order_while_it_turns() {
+    let mut data = cancelling(860.0, 2.0);
+    data.current_loop.settings.known = KnownMotor {
+        inductance_d_h: MOTOR.inductance_d_h,
+        inductance_q_h: MOTOR.inductance_q_h,
+        flux_linkage_wb: MOTOR.flux_linkage_wb,
+    };
+    for n in 1..=12 {
+        step(&mut data, 27.4);
+        let expected = 2.0 * (1.0 - (-f64::from(n) * STEP_S * 860.0).exp());
+        assert!((data.current_a.q - expected).abs() < 1e-9, "step {n}: {} A, {expected} A", data.current_a.q);
+        // What the current itself induces across is fed forward, too.
+        assert!(data.current_a.d.abs() < 1e-9, "step {n}: {} A across", data.current_a.d);
     }
 }
 
