@@ -194,7 +194,8 @@ struct Wire {
     worst_lag: Duration,
     /// Shared with who waits until it is small.
     lag: Rc<Cell<Duration>>,
-    gone: Vec<LeaveReason>,
+    /// Shared as the lag is.
+    gone: Rc<RefCell<Vec<LeaveReason>>>,
 }
 
 impl Wire {
@@ -254,7 +255,7 @@ impl RealTimeWorld for Wire {
     }
 
     fn left(&mut self, _: ClientId, reason: LeaveReason) {
-        self.gone.push(reason);
+        self.gone.borrow_mut().push(reason);
     }
 
     fn set_lag(&mut self, lag: Duration) {
@@ -352,18 +353,21 @@ async fn a_world_learns_when_a_client_is_gone_and_after_its_frames() {
     let address = socketcand_port(&hub);
     let (orders, mut commands) = mpsc::channel(1);
     let mut world = Wire::default();
+    let gone = world.gone.clone();
     let clients = async {
         let mut listener = socketcand(address, &clock).await;
         let mut sender = socketcand(address, &clock).await;
         sender.send(&frame("123#01")).await.unwrap();
         drop(sender);
         assert_eq!(heard(&mut listener, &clock).await, frame("123#01"));
-        clock.sleep(Duration::from_millis(50)).await;
+        while gone.borrow().is_empty() {
+            clock.sleep(Duration::from_millis(1)).await;
+        }
         orders.send(Order::Stop).await.unwrap();
     };
     let running = run_world(&mut world, &mut hub, &clock, &mut commands, obey);
     soon(&clock, async { tokio::join!(running, clients) }).await;
-    assert_eq!(world.gone, [LeaveReason::Closed]);
+    assert_eq!(*gone.borrow(), [LeaveReason::Closed]);
 }
 
 #[tokio::test]
