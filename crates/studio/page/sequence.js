@@ -68,6 +68,20 @@ function testMotionArguments({ motion, quantities, capture_ms }) {
   ].join(", ");
 }
 
+/** What a tuning is asked for: each as it is written for the command line and for Python, where it is given. */
+function tuneOptions({ bandwidth_hz, phase_margin_deg, position, speed_rpm, current_a, travel_turns, period_ms, torque_constant_nm_a, applied }) {
+  return [
+    bandwidth_hz === null ? { option: `phase-margin ${figure(phase_margin_deg)}`, argument: `phase_margin=${figure(phase_margin_deg)}` } : { option: `bandwidth ${figure(bandwidth_hz)}`, argument: `bandwidth=${figure(bandwidth_hz)}` },
+    position ? { option: "loop position", argument: "position=True" } : null,
+    speed_rpm === null ? null : { option: `speed ${figure(speed_rpm)}rpm`, argument: `speed_rpm=${figure(speed_rpm)}` },
+    { option: `current ${figure(current_a)}A`, argument: `current_a=${figure(current_a)}` },
+    { option: `travel ${figure(travel_turns)}turn`, argument: `travel_turns=${figure(travel_turns)}` },
+    { option: `period ${ms(period_ms)}`, argument: `period=${figure(period_ms / 1e3)}` },
+    torque_constant_nm_a === null ? null : { option: `torque-constant ${figure(torque_constant_nm_a)}`, argument: `torque_constant=${figure(torque_constant_nm_a)}` },
+    applied ? { option: "apply", argument: "apply=True" } : null,
+  ].filter((one) => one !== null);
+}
+
 /** Where a form has no word for a command, it has a line for people. */
 const LEFT_OUT = (what) => `# left out: ${what}`;
 
@@ -152,6 +166,18 @@ const ROWS = {
     cli: ({ node, ...order }) => (order.motion.shape === "path" ? [LEFT_OUT(`node ${node}: a test motion along a path of ${order.motion.path.length} points; with a capture: ferrodrive test-motion ${node} path --path FILE`)] : `test-motion ${node} ${order.motion.shape} ${testMotionOptions(/** @type {any} */ (order)).map(([name, value]) => `--${name} ${value}`).join(" ")}`),
     python: (order) => `test_motion(${testMotionArguments(order)})`,
   },
+  tune: {
+    shown: ({ bandwidth_hz, phase_margin_deg, position, speed_rpm, current_a, travel_turns }) => `Find gains for ${bandwidth_hz === null ? `a phase margin of ${figure(phase_margin_deg)}°` : `a bandwidth of ${figure(bandwidth_hz)} Hz`}${position ? ", position too" : ""}; at most ${speed_rpm === null ? "its usual speed" : `${figure(speed_rpm)} r/min`}, ${figure(current_a)} A, ${figure(travel_turns)} turns`,
+    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.tune.shown(command)}`),
+    cli: (command) => `tune ${command.node} ${tuneOptions(command).map(({ option }) => `--${option}`).join(" ")}  # waits for its end`,
+    python: (command) => `tune(${tuneOptions(command).map(({ argument }) => argument).join(", ")})  # waits for its end`,
+  },
+  try_gains: {
+    shown: () => "Try the gains that were found last",
+    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.try_gains.shown()}`),
+    cli: ({ node }) => [LEFT_OUT(`node ${node}: gains that were found before this sequence are tried`)],
+    python: ({ node }) => [LEFT_OUT(`node ${node}: gains that were found before this sequence are tried`)],
+  },
 };
 
 /** The model of a node as a further argument, if it is known. */
@@ -178,8 +204,12 @@ const WHOLE = {
   group_move: ({ axes }) => Array.isArray(axes) && axes.length > 1 && axes.every((axis) => Number.isInteger(axis?.node) && typeof axis.degrees === "number"),
   write_pdos: ({ pdos }) => Array.isArray(pdos) && pdos.length > 0 && pdos.every(isPdo),
   capture: ({ quantities, trigger }) => isNames(quantities) && (trigger === null || typeof trigger === "string"),
+  tune: (command) => typeof command.position === "boolean" && TUNE_FIGURES.every((name) => isFigure(command[name])) && TUNE_CHOICES.every((name) => command[name] === null || isFigure(command[name])),
   test_motion: ({ motion, quantities }) => isNames(quantities) && SHAPES.some(({ value }) => value === motion?.shape) && Array.isArray(motion.path),
 };
+const TUNE_FIGURES = ["phase_margin_deg", "current_a", "travel_turns", "period_ms"];
+const TUNE_CHOICES = ["bandwidth_hz", "speed_rpm", "torque_constant_nm_a"];
+const isFigure = (value) => Number.isFinite(value);
 const isObject = (object) => typeof object === "string" && /^[0-9A-F]{4}h:[0-9A-F]{2}$/.test(object);
 const isPdo = (one) => typeof one === "object" && one !== null && isWholePdo(one);
 const isWholePdo = ({ pdo, valid, objects, ...rest }) => /^[RT]PDO[0-9]+$/.test(pdo) && typeof valid === "boolean" && (objects === undefined || (Array.isArray(objects) && objects.every((entry) => isObject(entry?.object)))) && Object.entries(rest).every(([name, value]) => /^[a-z_]+$/.test(name) && typeof value === "number");
@@ -240,9 +270,30 @@ function modelsOf(steps, models) {
   return models.filter(({ node, model }) => nodes.has(node) && /^[a-z0-9-]+$/.test(model));
 }
 
+/** Commands whose answer the next one may need: a play goes on behind it. */
+export const isAwaited = ({ do: word }) => word === "tune";
+
+/** Where a program has one command for gains that are found and tried: the trial is an option of the tuning. */
+function withTrials(steps) {
+  const tuningOf = new Map();
+  const said = [];
+  for (const step of steps) {
+    const { do: word, node } = step.command;
+    const tuning = tuningOf.get(node);
+    if (word === "try_gains" && tuning !== undefined) {
+      said[tuning] = { ...said[tuning], command: { ...said[tuning].command, applied: true } };
+      tuningOf.delete(node);
+      continue;
+    }
+    if (word === "tune") tuningOf.set(node, said.length);
+    said.push(step);
+  }
+  return said;
+}
+
 /** As commands of a shell; `bus` as the studio has it, `models` is the model of each node. */
 export function commandLine(steps, bus, models = []) {
-  const lines = steps.flatMap((step, at) => {
+  const lines = withTrials(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     const said = ROWS[step.command.do].cli(step.command);
     return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
@@ -258,7 +309,7 @@ export function commandLine(steps, bus, models = []) {
 export function python(steps, bus, models = []) {
   const known = new Map(modelsOf(steps, models).map(({ node, model }) => [node, JSON.stringify(model)]));
   const nodes = [...new Set(steps.flatMap(({ command }) => nodesOf(command)))];
-  const lines = steps.flatMap((step, at) => {
+  const lines = withTrials(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     const said = ROWS[step.command.do].python(step.command, known);
     const own = Array.isArray(said) ? said : [`node_${step.command.node}.${said}`];

@@ -3,7 +3,7 @@
 import { ask, inControl, link, on, stopAll } from "./link.js";
 import { choice } from "./choice.js";
 import { h, setText, toggle } from "./dom.js";
-import { commandLine, keptSteps, nodesOf, python, recorder, scenario, shownStep } from "./sequence.js";
+import { commandLine, isAwaited, keptSteps, nodesOf, python, recorder, scenario, shownStep } from "./sequence.js";
 import { keep, kept } from "./settings.js";
 
 const KEY = "sequence";
@@ -25,7 +25,7 @@ export function sequencePanel(isAccepted) {
   const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
   const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
   const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
-  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, those of several drives together, homing, NMT, PDOs, parameters that are typed in their row and stored, captures and test motions. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not.");
+  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, those of several drives together, homing, NMT, PDOs, parameters that are typed in their row and stored, captures, test motions and gains that are found and tried. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not; what follows gains that are found waits for them.");
   const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
   let steps = keptSteps(kept(KEY, []));
   /** What records; null while nothing is recorded. */
@@ -113,13 +113,16 @@ export function sequencePanel(isAccepted) {
     const mine = { nodes: new Set() };
     playing = mine;
     play.checked = true;
+    /** The answer that the next command waits for. */
+    let awaited = null;
     for (const [at, { after_s, command }] of steps.entries()) {
       if (at > 0) await new Promise((resolve) => setTimeout(resolve, after_s * 1e3));
+      await awaited;
       if (playing !== mine) return;
       setText(status, `${at + 1} of ${steps.length}: ${shownStep(steps[at], 0)}`);
       for (const node of nodesOf(command)) mine.nodes.add(node);
-      // Not awaited: the next command comes when it came, and replaces a motion that is not done.
-      ask(command).then((answer) => {
+      // The next command comes when it came, and replaces a motion that is not done; one that needs what this finds waits for it.
+      const answered = ask(command).then((answer) => {
         // The Scope view keeps what was captured.
         if (answer.ok) dispatchEvent(new CustomEvent("played", { detail: { command, result: answer.result } }));
         if (playing !== mine || answer.ok || answer.error.kind === "replaced") return;
@@ -128,7 +131,9 @@ export function sequencePanel(isAccepted) {
         if (answer.error.kind === "stopped") stopped(false, why);
         else halt(why);
       });
+      awaited = isAwaited(command) ? answered : null;
     }
+    await awaited;
     if (playing === mine) halt(`all ${steps.length} commands were sent`, false);
   }
 

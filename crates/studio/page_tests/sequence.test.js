@@ -181,3 +181,30 @@ test("a model that is known is named where an identity may fit several", () => {
   const text = python(measured, "can0", models);
   for (const line of ['    node_4 = network.drive(4, "zlac8030l")', '    network.params(4, "zlac8030l").apply("node4.toml")']) assert.ok(text.includes(`${line}\n`), line);
 });
+
+const tune = { do: "tune", node: 4, bandwidth_hz: null, phase_margin_deg: 45, position: false, speed_rpm: 60, current_a: 8, travel_turns: 20, period_ms: 5, torque_constant_nm_a: null };
+const tuned = [
+  { after_s: 0, command: tune },
+  { after_s: 40, command: { do: "try_gains", node: 4 } },
+  { after_s: 20, command: { do: "store", node: 4 } },
+  { after_s: 1, command: { ...tune, bandwidth_hz: 20, position: true, speed_rpm: null, torque_constant_nm_a: 0.9 } },
+];
+
+test("a tuning has its limits in each form, and its trial as its option", () => {
+  assert.deepEqual(keptSteps(tuned), tuned);
+  const { take } = recorder();
+  assert.deepEqual(tuned.flatMap(({ command }) => take(command)), tuned.map(({ command }) => command));
+  assert.equal(shownStep(tuned[0], 0), "node 4: Find gains for a phase margin of 45°; at most 60 r/min, 8 A, 20 turns");
+  assert.match(
+    commandLine(tuned, "can0"),
+    /^ferrodrive tune 4 --phase-margin 45 --speed 60rpm --current 8A --travel 20turn --period 5ms --apply {2}# waits for its end\nsleep 20\nferrodrive save 4\nsleep 1\nferrodrive tune 4 --bandwidth 20 --loop position --current 8A --travel 20turn --period 5ms --torque-constant 0.9 {2}# waits for its end$/m,
+  );
+  const text = python(tuned, "can0");
+  for (const line of ["    node_4.tune(phase_margin=45, speed_rpm=60, current_a=8, travel_turns=20, period=0.005, apply=True)  # waits for its end", "    node_4.tune(bandwidth=20, position=True, current_a=8, travel_turns=20, period=0.005, torque_constant=0.9)  # waits for its end"]) assert.ok(text.includes(`${line}\n`), line);
+  assert.match(scenario(tuned, [{ node: 4, model: "zlac8030l" }]), /^ {4}# left out: node 4: Find gains for a phase margin of 45°.*\n {4}"wait 40s",\n {4}# left out: node 4: Try the gains that were found last$/m);
+});
+
+test("a trial without its tuning is named, and a tuning without limits is not kept", () => {
+  assert.match(commandLine(tuned.slice(1, 2), "can0"), /^# left out: node 4: gains that were found before/m);
+  for (const name of ["current_a", "travel_turns", "period_ms"]) assert.deepEqual(keptSteps([{ after_s: 0, command: { ...tune, [name]: null } }]), [], name);
+});
