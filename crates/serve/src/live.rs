@@ -76,7 +76,7 @@ impl LiveBus {
     pub async fn run<U: Future>(
         self,
         (network, who): (&Network, &str),
-        mut station: impl Station + Send + 'static,
+        mut station: impl Station + Clone + Send + 'static,
         until: U,
         report: impl FnMut(Instant, &Note),
     ) -> Result<U::Output, LostBus> {
@@ -86,7 +86,7 @@ impl LiveBus {
         network.on_activity(waker_of(Arc::clone(&wakeup)));
         let ended = match bus {
             OpenBus::Here(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
-            OpenBus::World(mut bus) => run_station(&mut bus, &mut station, &clock, &wakeup, until, report).await,
+            OpenBus::World(bus) => Ok(bus.run(station, &wakeup, until).await),
             OpenBus::Thread(thread) => thread.run(station, wakeup, until, report).await,
         };
         ended.map_err(|error| LostBus { error, moving: Account::of_lost_bus(network, who) })

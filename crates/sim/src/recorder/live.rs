@@ -34,8 +34,6 @@ struct LiveShared {
 struct LiveState {
     feeds: Vec<Feed>,
     next_token: u64,
-    /// The host's time less the world's, ns.
-    ahead_ns: i64,
 }
 
 /// What one subscription is about, and its samples.
@@ -66,7 +64,7 @@ pub struct Subscription {
 /// What came since the last look.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// When each was taken, in the host's time.
+    /// When each was taken.
     pub times: Vec<Instant>,
     /// One after the other, each with its signals in the order of the subscription.
     pub values: Vec<f64>,
@@ -91,13 +89,7 @@ impl LiveValues {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// For a world whose host counts time otherwise: what the host's clock shows when the world is at `world`. Holds for samples from
-    /// here on.
-    pub fn set_host_time(&self, host: Instant, world: Instant) {
-        self.lock().ahead_ns = host.as_nanos() as i64 - world.as_nanos() as i64;
-    }
-
-    /// Begins to sample an axis of the drive that has this node-ID, from `first_at` in the host's time on and every `period` (at least
+    /// Begins to sample an axis of the drive that has this node-ID, from `first_at` on and every `period` (at least
     /// 1 us) from there.
     pub fn subscribe(
         &self,
@@ -109,7 +101,6 @@ impl LiveValues {
         let mut state = self.lock();
         state.next_token += 1;
         let (token, width) = (state.next_token, signals.len());
-        let next_at = shifted(first_at, -state.ahead_ns);
         let (times, values) = (Vec::new(), Vec::new());
         let period = period.max(Duration::from_micros(1));
         let feed = Feed {
@@ -117,7 +108,7 @@ impl LiveValues {
             node,
             axis,
             signals,
-            next_at,
+            next_at: first_at,
             period,
             number: None,
             times,
@@ -152,7 +143,6 @@ impl LiveValues {
         number_of: impl Fn(&mut W, u8) -> Option<u8>,
     ) {
         let mut state = self.lock();
-        let ahead_ns = state.ahead_ns;
         for feed in state.feeds.iter_mut().filter(|feed| feed.next_at <= at) {
             if feed.number.is_none() {
                 feed.number = number_of(world, feed.node);
@@ -167,7 +157,7 @@ impl LiveValues {
                 continue;
             }
             let report = feed.number.and_then(|node| measure(world, Place { node, axis: feed.axis }));
-            feed.times.push(shifted(at, ahead_ns));
+            feed.times.push(at);
             let of = |signal: &Signal| report.as_ref().map_or(f64::NAN, |report| signal.of(report));
             feed.values.extend(feed.signals.iter().map(of));
         }
@@ -208,10 +198,6 @@ impl Drop for Subscription {
         state.feeds.retain(|feed| feed.token != self.token);
         self.of.note_next(&state);
     }
-}
-
-fn shifted(at: Instant, by_ns: i64) -> Instant {
-    Instant::from_nanos(at.as_nanos().saturating_add_signed(by_ns))
 }
 
 /// The place of a world for it. A copy of the world is another world, which no host looks at.

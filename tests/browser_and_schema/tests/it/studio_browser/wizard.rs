@@ -1,31 +1,41 @@
-//! The wizard for gains to its end, in a real browser. What the studio's host answers for a wheel with a load is that of its session in virtual
-//! time (`crates/host/src/tests/tune.rs`), which a page with a clock cannot have: here the page is handed those answers when it asks.
+//! The wizard for gains to its end, in a real browser, with a virtual drive: a wheel with a load. Then the same from a recorded sequence.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::Stage;
 
-/// What the host has answered to `tune`, and to `try_gains` behind it.
-const FOUND: &str = include_str!("../../data/tune_found.json");
-const TRIED: &str = include_str!("../../data/tune_tried.json");
+/// A wheel with a load on its shaft, behind two other drives.
+const MACHINE: &str = "drive = [
+    { model = \"cia402\", node = 1 },
+    { model = \"zlim42c\", node = 2 },
+    { model = \"zlac8030l\", node = 4, load = { inertia_kg_m2 = 0.05 } },
+]
+";
+const LOAD_KG_M2: f64 = 0.05;
 
-/// Answers these commands in place of the studio, and keeps what was asked.
-const ANSWER: &str = "const answers = JSON.parse(arguments[0]), send = WebSocket.prototype.send; window.asked = []; \
-    WebSocket.prototype.send = function (text) { \
-      const message = JSON.parse(text), result = answers[message.do]; \
-      if (!result) return send.call(this, text); \
-      window.asked.push(message); \
-      const data = JSON.stringify({ type: 'answer', seq: message.seq, ok: true, result }); \
-      setTimeout(() => this.dispatchEvent(new MessageEvent('message', { data }))); }";
+/// The rows of the table of proposed gains, each `[object, name, has, proposed]`.
+const GAINS: &str = "return [...document.querySelectorAll('#tune-had tr')].map((row) => [...row.cells].map((cell) => cell.textContent)) \
+    .filter(([object]) => /^2[0-9A-F]{3}h/.test(object))";
 
 impl Stage {
     /// Shows the form of the Scope view, of the wheel.
     async fn wizard(&self) {
-        self.take_the_wheel().await;
         self.click("#tabs [data-name=scope]").await;
         self.find("#tune").await;
         self.script("document.getElementById('tune').open = true").await;
         self.says("#tune-warning", "120 r/min at most").await;
+    }
+
+    /// What the drive has in these objects, read by the page.
+    async fn upload_all(&self, objects: &[String]) -> Vec<String> {
+        let read = "const [objects, done] = arguments; import('/page/bundle.js').then(async ({ modules }) => \
+                    done(await modules['link.js'].ask({ do: 'read_objects', node: 4, objects })))";
+        let read = self.client.execute_async(read, vec![objects.into()]).await.expect("it is asked");
+        let values = read["result"]["values"].as_array().unwrap_or_else(|| panic!("{read}"));
+        values
+            .iter()
+            .map(|value| value["text"].as_str().and_then(|text| text.split(' ').next()).expect("a value").to_owned())
+            .collect()
     }
 
     /// How many elements there are.
@@ -37,36 +47,33 @@ impl Stage {
 #[tokio::test]
 #[ignore = "needs a browser: cargo xtask test --only studio"]
 async fn the_wizard_for_gains_shows_what_was_found_writes_it_and_goes_back() {
-    let (found, tried): (Value, Value) =
-        (serde_json::from_str(FOUND).expect("JSON"), serde_json::from_str(TRIED).expect("JSON"));
-    let stage = Stage::open("wizard").await;
+    let folder = processes::scratch("studio_wizard_machine");
+    let machine = folder.join("machine.toml");
+    std::fs::write(&machine, MACHINE).expect("it is written");
+    let stage = Stage::open_on("wizard", &["--bus", &format!("sim:{}", machine.display())]).await;
+    stage.take_the_wheel().await;
+    stage.click("#sequence summary").await;
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=true]").await;
     stage.wizard().await;
-    let back = json!({ "steps": [], "rounded": [] });
-    let answers = json!({ "tune": found, "try_gains": tried, "roll_back": back }).to_string();
-    stage.client.execute(ANSWER, vec![answers.into()]).await.expect("it runs");
     stage.has_done("#tune-agreed[aria-pressed=false], #tune-start", "#tune-status", "The drive has what it had").await;
-    // The order has the limits that were agreed to.
-    let asked = stage.script("return window.asked[0]").await;
-    assert_eq!((&asked["do"], &asked["node"]), (&"tune".into(), &4.into()), "{asked}");
-    let limits = ["speed_rpm", "current_a", "travel_turns"].map(|name| asked[name].as_f64().unwrap_or(f64::NAN));
-    assert_eq!(limits, [120.0, 15.0, 40.0], "{asked}");
     // Bode: gain, phase and coherence, with the drive, its twin and the model in the first two.
     assert_eq!(stage.count("#tune-had svg:first-of-type .frame").await, 3);
     for line in ["line", "twin", "model"] {
         assert!(stage.count(&format!("#tune-had svg:first-of-type path.{line}")).await.as_u64() >= Some(2), "{line}");
     }
-    let inertia = found["inertia_kg_m2"].as_f64().expect("an inertia");
     let shown = stage.says("#tune-had", "kg·m²").await;
-    // Three digits of it.
-    let digits =
-        shown.split("Inertia").nth(1).and_then(|rest| rest.trim().split(' ').next()).expect("a figure").parse::<f64>();
-    assert!((digits.expect("a number") / inertia - 1.0).abs() < 0.005, "{inertia}: {shown}");
-    for gain in found["gains"].as_array().expect("gains") {
-        let row = ["object", "name", "before", "after"].map(|name| gain[name].to_string().replace('"', ""));
-        let is_row = "return [...document.querySelectorAll('#tune-had tr')].map((row) => [...row.cells].map((cell) => cell.textContent).join('|'))";
-        let rows = stage.script(is_row).await;
-        assert!(rows.as_array().expect("rows").contains(&row.join("|").into()), "{row:?}: {rows}");
-    }
+    let inertia = shown.split("Inertia").nth(1).and_then(|rest| rest.trim().split(' ').next()).expect("a figure");
+    let inertia: f64 = inertia.parse().expect("a number");
+    // That of the load and of its rotor, which is far less. How true it is, the host's tests ask.
+    assert!(inertia > LOAD_KG_M2 && inertia < 1.5 * LOAD_KG_M2, "{inertia} kg m²");
+    let proposed = stage.script(GAINS).await;
+    let proposed = proposed.as_array().expect("rows");
+    assert!(proposed.len() >= 2 && proposed.iter().all(|row| row[2] != row[3]), "{proposed:?}");
+    let objects: Vec<String> = proposed.iter().map(|row| row[0].as_str().expect("an object").to_owned()).collect();
+    let has = async || stage.upload_all(&objects).await;
+    let column =
+        |at: usize| proposed.iter().map(|row| row[at].as_str().expect("a value").to_owned()).collect::<Vec<_>>();
+    assert_eq!(has().await, column(2), "nothing is written yet");
     stage.find("#tune-back[hidden]").await;
     stage.is_usable("what was found").await;
     stage.device(320, 640).await;
@@ -84,8 +91,27 @@ async fn the_wizard_for_gains_shows_what_was_found_writes_it_and_goes_back() {
     stage.script("document.querySelector('#tune-had').scrollIntoView()").await;
     stage.shoot("wizard_tried").await;
     stage.has_done("#tune-back", "#tune-status", "the drive has its former values, read back").await;
-    let words = stage.script("return window.asked.map((message) => `${message.do} ${message.node}`)").await;
-    assert_eq!(words, json!(["tune 4", "try_gains 4", "roll_back 4"]));
     stage.find("#tune-back[hidden]").await;
+    assert_eq!(has().await, column(2), "as it was");
+    // Recorded with its limits; played, the trial waits for what the measurement finds.
+    stage.click("#tabs [data-name=motion]").await;
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=false]").await;
+    let recorded = stage.says(".sequence li:nth-last-child(2)", "Find gains for a phase margin of 40°").await;
+    assert!(recorded.ends_with("at most 120 r/min, 15 A, 40 turns"), "{recorded}");
+    stage.says(".sequence li:last-child", "Try the gains that were found last").await;
+    stage
+        .says(
+            "#sequence-text",
+            "ferrodrive tune 4 --phase-margin 40 --speed 120rpm --current 15A --travel 40turn --period 5ms --apply",
+        )
+        .await;
+    // Pressed again where a state that came late has ended it.
+    let play = "const of = document.querySelector('#sequence-play'); \
+                const are_sent = document.querySelector('#sequence-status').textContent.includes('commands were sent'); \
+                if (!of.checked && !are_sent) of.click(); return are_sent";
+    stage.until("all are sent", async || stage.script(play).await == true).await;
+    stage.wheel("what was found is tried", |wheel| wheel["doing"] == "tuning" && super::speed(wheel) > 5.0);
+    stage.wheel("it has been tried", |wheel| wheel["doing"].is_null());
+    assert_ne!(has().await, column(2), "it has gains that were found");
     stage.close().await;
 }
