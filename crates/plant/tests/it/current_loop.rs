@@ -68,6 +68,13 @@ fn a_loop_that_knows_its_motor_is_of_first_order_while_it_turns() {
         // What the current itself induces across is fed forward, too.
         assert!(data.current_a.d.abs() < 1e-9, "step {n}: {} A across", data.current_a.d);
     }
+    // What a winding with 2 A across its magnets takes, of which most is fed forward.
+    (0..400).for_each(|_| drop(step(&mut data, 27.4)));
+    let omega = 27.4 * f64::from(MOTOR.pole_pairs);
+    let expected_v =
+        Dq { d: -omega * MOTOR.inductance_q_h * 2.0, q: MOTOR.resistance_ohm * 2.0 + omega * MOTOR.flux_linkage_wb };
+    let Dq { d, q } = data.current_loop.wanted_v;
+    assert!((d - expected_v.d).abs() < 1e-6 && (q - expected_v.q).abs() < 1e-6, "{d} V, {q} V, {expected_v:?}");
 }
 
 #[test]

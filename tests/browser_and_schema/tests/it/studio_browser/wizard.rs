@@ -1,8 +1,10 @@
 //! The wizard for gains to its end, in a real browser, with a virtual drive: a wheel with a load. Then the same from a recorded sequence.
 
+use std::cell::Cell;
+
 use serde_json::Value;
 
-use super::Stage;
+use super::{Stage, WHEEL};
 
 /// A wheel with a load on its shaft, behind two other drives.
 const MACHINE: &str = "drive = [
@@ -12,6 +14,9 @@ const MACHINE: &str = "drive = [
 ]
 ";
 const LOAD_KG_M2: f64 = 0.05;
+
+/// A state comes some ten times a second: what is not going on for so many looks has ended.
+const LOOKS_AT_REST: u32 = 40;
 
 /// The rows of the table of proposed gains, each `[object, name, has, proposed]`.
 const GAINS: &str = "return [...document.querySelectorAll('#tune-had tr')].map((row) => [...row.cells].map((cell) => cell.textContent)) \
@@ -105,13 +110,23 @@ async fn the_wizard_for_gains_shows_what_was_found_writes_it_and_goes_back() {
             "ferrodrive tune 4 --phase-margin 40 --speed 120rpm --current 15A --travel 40turn --period 5ms --apply",
         )
         .await;
-    // Pressed again where a state that came late has ended it.
-    let play = "const of = document.querySelector('#sequence-play'); \
-                const are_sent = document.querySelector('#sequence-status').textContent.includes('commands were sent'); \
-                if (!of.checked && !are_sent) of.click(); return are_sent";
-    stage.until("all are sent", async || stage.script(play).await == true).await;
-    stage.wheel("what was found is tried", |wheel| wheel["doing"] == "tuning" && super::speed(wheel) > 5.0);
-    stage.wheel("it has been tried", |wheel| wheel["doing"].is_null());
+    let listen = "window.applied = null; addEventListener('played', ({ detail }) => (window.applied = detail.result?.applied ?? window.applied))";
+    stage.script(listen).await;
+    // Pressed again once nothing is going on any more, where a page that was held up has ended it.
+    let looks_at_rest = Cell::new(LOOKS_AT_REST);
+    stage
+        .until("a play whose gains are kept", async || {
+            let plays = stage.script("return document.querySelector('#sequence-play').checked").await == true;
+            let is_idle = !plays && stage.studio.state()["nodes"][WHEEL]["doing"].is_null();
+            looks_at_rest.set(if is_idle { looks_at_rest.get() + 1 } else { 0 });
+            let are_kept = stage.script("return window.applied").await == true;
+            if !are_kept && looks_at_rest.get() >= LOOKS_AT_REST {
+                looks_at_rest.set(0);
+                stage.click("#sequence-play").await;
+            }
+            are_kept
+        })
+        .await;
     assert_ne!(has().await, column(2), "it has gains that were found");
     stage.close().await;
 }
