@@ -80,6 +80,12 @@ export function marginRows({ before, after, position }) {
   return [row("Speed loop, as it is", before), row("Speed loop, proposed", after), ...(position ? [row("Position loop around it", position)] : [])];
 }
 
+/** A move by its own ramps, on the twin and on the drive, as rows: where, before, proposed; none without the position loop. */
+export function moveRows({ twin_move, drive_move }) {
+  const shown = ({ overshoot_deg, settled_s }) => `${settled_s === null ? "does not settle" : `settled after ${number(settled_s, 2)} s`}, ${number(overshoot_deg, 1)}° beyond`;
+  return [["On its twin", twin_move], ["On the drive", drive_move]].filter(([, rows]) => rows).map(([where, rows]) => [where, ...rows.map(shown)]);
+}
+
 /** What came of a trial, in a sentence, and whether it is good. */
 export function remarkOf(report) {
   const error = ([before, after]) => `${number(before, 2)} r/min·s before, ${number(after, 2)} after`;

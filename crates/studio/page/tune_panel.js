@@ -5,7 +5,7 @@ import { h, setText, table, toggle } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
-import { FIELDS, bodePanes, foundRows, marginRows, orderOf, rampRows, remarkOf, stepPane, warning, writingOf } from "./tune.js";
+import { FIELDS, bodePanes, foundRows, marginRows, moveRows, orderOf, rampRows, remarkOf, stepPane, warning, writingOf } from "./tune.js";
 import { picture } from "./tune_picture.js";
 
 const SETTINGS = "tune";
@@ -169,6 +169,7 @@ export function tunePanel(shared, report) {
       h("h2", { class: "small" }, "Proposed"),
       valueTable(result.gains),
       table(["Loop", "Crossover", "Phase margin", "Sensitivity", "State"], marginRows(result)),
+      ...(result.twin_move ? [table(["A move", "As it is", "Proposed"], moveRows(result))] : []),
       ...result.notes.map((note) => h("p", { class: "quiet" }, note)),
     );
     write.hidden = result.drive_error !== null;

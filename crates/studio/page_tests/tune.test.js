@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FIELDS, bodePanes, digits, foundRows, marginRows, orderOf, rampRows, remarkOf, stepPane, unwrapped, warning, writingOf } from "../page/tune.js";
+import { FIELDS, bodePanes, digits, foundRows, marginRows, moveRows, orderOf, rampRows, remarkOf, stepPane, unwrapped, warning, writingOf } from "../page/tune.js";
 import { decades, range, ticks } from "../page/tune_picture.js";
 
 const texts = (finds, more = {}) => ({ ...Object.fromEntries(Object.entries(FIELDS[finds]).map(([name, { usual }]) => [name, usual])), speed_rpm: "120", ...more });
@@ -50,6 +50,13 @@ test("what was found is shown with its units, and what was not found as that", (
   assert.deepEqual(marginRows(report({ position: margins(3, false) })).map((row) => [row[0], row[1], row[4]]), [
     ["Speed loop, as it is", "8.0 Hz", "stable"], ["Speed loop, proposed", "20.0 Hz", "stable"], ["Position loop around it", "3.0 Hz", "NOT stable"],
   ]);
+});
+
+test("a move is shown on the twin, and on the drive once it was tried there", () => {
+  const twin_move = [{ overshoot_deg: 0.25, settled_s: 1.234 }, { overshoot_deg: 9, settled_s: null }];
+  const on_twin = ["On its twin", "settled after 1.23 s, 0.3° beyond", "does not settle, 9.0° beyond"];
+  assert.deepEqual(moveRows({ twin_move, drive_move: null }), [on_twin]);
+  assert.deepEqual(moveRows({ twin_move, drive_move: [...twin_move].reverse() })[1], ["On the drive", on_twin[2], on_twin[1]]);
 });
 
 test("it is said what the drive has", () => {

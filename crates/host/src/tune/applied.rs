@@ -10,7 +10,8 @@ use master::parameters::Parameters;
 use tune::Objective;
 use words::failure::{Failure, both};
 
-use super::bench::{ENOUGH_CURRENT, SWINGS, bytes};
+use super::bench::{CURRENT_KIND, ENOUGH_CURRENT, SWINGS, bytes};
+use super::moves::{MoveRow, TrialMove, WRITTEN};
 use super::setup::keep;
 use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
 use crate::capture::{Restorer, with_left};
@@ -77,32 +78,20 @@ pub async fn try_gains(
     progress.show(format!("node {id}: a step with the gains that it has"));
     // The first thing that a step does to the current is proportional to it.
     let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
-    let before = step((drive, restorer), request, most_rpm, excursion).await?;
+    let before = trial((drive, restorer), request, most_rpm, excursion).await?;
     let undo = proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
     // Until the new gains are kept or gone: whatever ends the program meanwhile.
     keep((drive, restorer), former.as_deref(), undo, request.on_kept).await?;
     let after = match write(drive, request, &proposed, progress).await {
         Ok(()) => {
             progress.show(format!("node {id}: the same step with the new gains"));
-            step((drive, restorer), request, most_rpm, excursion).await
+            trial((drive, restorer), request, most_rpm, excursion).await
         }
         Err(failure) => Err(failure),
     };
     report.peak_a = report.peak_a.max(excursion.peak_a);
     report.travel_turns = report.travel_turns.max(excursion.travel_turns);
-    // Why they do not stay: gains that were not seen to hold the shaft do not, whatever stopped it.
-    let objection = match after {
-        Err(failure) => Err(failure),
-        Ok(after) => {
-            report.drive_error = Some([before.error(), after.error()]);
-            let why = objection(&before, &after, request, &report);
-            report.curves.drive = Some([before, after]);
-            match why {
-                None if wants_back.await => Ok(Some(BACK.to_owned())),
-                why => Ok(why.map(|why| format!("{why}: {BACK}"))),
-            }
-        }
-    };
+    let objection = judged(before, after, request, &mut report, wants_back).await;
     if let Ok(None) = objection {
         report.applied = true;
         let undeleted = restorer.keep_newest().err();
@@ -124,6 +113,45 @@ pub async fn try_gains(
     }
     report.notes.extend(both(objection, back)?.into_iter().chain(undeleted));
     Ok(report)
+}
+
+/// Why the new gains do not stay, after a trial with the former ones and one with them; it is noted in the report.
+async fn judged(
+    (before, move_before): (StepResponse, Option<MoveRow>),
+    after: Result<(StepResponse, Option<MoveRow>), Failure>,
+    request: &Request,
+    report: &mut TuneReport,
+    wants_back: impl Future<Output = bool>,
+) -> Result<Option<String>, Failure> {
+    // Gains that were not seen to hold the shaft do not stay, whatever stopped it.
+    let (after, move_after) = after.map_err(|failure| match failure.kind == CURRENT_KIND {
+        true => failure.next("ask for gains that take less, e.g. --phase-margin 50"),
+        false => failure,
+    })?;
+    report.drive_error = Some([before.error(), after.error()]);
+    report.drive_move = move_before.zip(move_after).map(<[MoveRow; 2]>::from);
+    let why = objection(&before, &after, request, report).or_else(|| {
+        let [before, after] = report.drive_move?;
+        let twin = report.twin_move.map(|[_, after]| after);
+        after.objection(&before, twin.as_ref(), MORE_THAN_TWIN, request.bounds.speed_rpm)
+    });
+    report.curves.drive = Some([before, after]);
+    Ok(match why {
+        None if wants_back.await => Some(BACK.to_owned()),
+        why => why.map(|why| format!("{why}: {BACK}")),
+    })
+}
+
+/// A step, and a move where the position loop was asked for, with the gains that it has.
+async fn trial(
+    on: (&Drive, &Restorer),
+    request: &Request,
+    most_rpm: f64,
+    excursion: &mut Excursion,
+) -> Result<(StepResponse, Option<MoveRow>), Failure> {
+    let answer = step(on, request, most_rpm, excursion).await?;
+    let moved = if request.with_position { Some(move_there_and_back(on, request, excursion).await?) } else { None };
+    Ok((answer, moved))
 }
 
 /// What is led back to are the gains that were measured: nothing has written others since.
@@ -183,7 +211,8 @@ pub async fn step(
 ) -> Result<StepResponse, Failure> {
     let (model, loops) = loops_of(drive)?;
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
-    let setup = Setup::begin((drive, restorer), (model, loops), false, journal, on_kept).await?;
+    let setup = Setup::begin((drive, restorer), (model, loops), &[], journal, on_kept).await?;
+    restorer.begin_motion(loops.demand.is_some());
     let answer = async {
         setup.prepare(drive, 1.0).await?;
         if loops.demand.is_none() {
@@ -200,6 +229,31 @@ pub async fn step(
     };
     let answer = answer.await;
     both(answer, setup.put_back(drive).await)
+}
+
+/// How the drive itself moves with the gains that it has, there and back. What was written for that is put back.
+///
+/// # Errors
+/// What stopped it, and that not everything could be put back.
+pub async fn move_there_and_back(
+    (drive, restorer): (&Drive, &Restorer),
+    request: &Request,
+    excursion: &mut Excursion,
+) -> Result<MoveRow, Failure> {
+    let (model, loops) = loops_of(drive)?;
+    let mut reader = Reader::of(drive, request.bounds, *excursion)?;
+    let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
+    let setup = Setup::begin((drive, restorer), (model, loops), &WRITTEN, journal, on_kept).await?;
+    restorer.begin_motion(false);
+    let row = async {
+        setup.prepare(drive, 1.0).await?;
+        reader.guard(request.cyclic.guard).await?;
+        let row = reader.moves(TrialMove::new(request.bounds.speed_rpm)).await;
+        *excursion = reader.excursion;
+        both(row, reader.stop().await)
+    };
+    let row = row.await;
+    both(row, setup.put_back(drive).await)
 }
 
 /// Where the former gains are kept, beside the journal of a transaction.

@@ -19,6 +19,7 @@ use words::failure::{Failure, both};
 
 use super::bench::{Bounds, Excursion, StepResponse};
 use super::found::Found;
+use super::moves::{LOOKED_AT_S, MoveRow, TrialMove};
 use super::setup::Setup;
 use crate::stopping::bring_to_rest;
 
@@ -233,6 +234,23 @@ impl Reader {
         })
     }
 
+    /// A move, and back.
+    ///
+    /// # Errors
+    /// See [`measure`](Self::measure).
+    pub(super) async fn moves(&mut self, mut trial: TrialMove) -> Result<MoveRow, Failure> {
+        let from_turns = self.look().await?.turns;
+        trial.begin(&self.drive, false).await?;
+        let began = self.now();
+        while self.now() - began < Duration::from_secs_f64(LOOKED_AT_S) {
+            let seen = self.look().await?;
+            trial.see((seen.at - began).as_secs_f64(), (seen.turns - from_turns) * 360.0);
+        }
+        trial.begin(&self.drive, true).await?;
+        self.watch(Duration::from_secs_f64(LOOKED_AT_S)).await?;
+        Ok(trial.row())
+    }
+
     /// At rest by its ramp, and without power.
     ///
     /// # Errors
@@ -243,9 +261,9 @@ impl Reader {
             let unseen = Failure::new(NotAtRest::NotSeen { node }.to_string()).of_kind("not_stopped").at_node(node);
             unseen.next(format!("ferrodrive estop, and ferrodrive explain {node}")).after(error.into())
         });
-        // A load may turn a shaft without power: it is looked at once more.
-        let off = bring_to_rest(&self.drive).await;
-        let stood = both(off, stood);
+        // A load may turn a shaft without power: it is looked at once more. One that high gains hold may show counts of its encoder as a
+        // speed, and stands without power.
+        let stood = bring_to_rest(&self.drive).await.or_else(|failure| both(Err(failure), stood));
         if !self.is_guarded {
             return stood;
         }

@@ -17,7 +17,7 @@ use crate::capture::Restorer;
 
 use super::{
     Bounds, Currents, Curves, Excursion, Found, Measurement, MoveRow, OutputLoad, Proposed, Reader, ResponseRow, Setup,
-    Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of,
+    Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of, speed_gains,
 };
 
 /// How often the load of a twin is corrected, and the relative difference at which it is right.
@@ -146,6 +146,8 @@ pub struct TuneReport {
     pub twin_move: Option<[MoveRow; 2]>,
     /// The same of a step on the drive, once the values were tried there.
     pub drive_error: Option<[f64; 2]>,
+    /// The move on the drive.
+    pub drive_move: Option<[MoveRow; 2]>,
     /// The drive has the proposed values.
     pub applied: bool,
     /// What else is to be known.
@@ -211,7 +213,8 @@ pub async fn find(
     let motor = motor_of(model).ok_or_else(|| failed(&"no motor with magnets is known for its model"))?;
     let how = (request.period, request.bounds);
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
-    let had = Setup::begin((drive, restorer), (model, loops), true, journal, on_kept).await?;
+    let had = Setup::begin((drive, restorer), (model, loops), &speed_gains(loops), journal, on_kept).await?;
+    restorer.begin_motion(loops.demand.is_some());
     let (found, twin, twin_off, response) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
             let currents = both(currents(drive, &had, request, excursion).await, had.put_back(drive).await)?;
@@ -349,6 +352,7 @@ fn rows(node: u8, model: &Description, found: &Found, proposed: &Proposed, trial
         response: Vec::new(),
         curves: Curves { twin: trials.clone(), drive: None },
         drive_error: None,
+        drive_move: None,
         applied: false,
         notes: Vec::new(),
         picture: picture(model.title, found, trials),

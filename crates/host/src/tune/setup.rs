@@ -30,19 +30,19 @@ pub struct Setup {
 
 impl Setup {
     /// Reads what is going to be changed, and keeps the way back in the restorer, and in a journal, if one is named. Writes nothing to
-    /// the drive. Gains are put back where they may be lowered.
+    /// the drive. The caller notes what motion begins then. `also` is what is written beside what every measurement writes, such as gains that may be lowered.
     ///
     /// # Errors
     /// The drive is at work, or does not answer; a journal of an earlier transaction is there.
     pub async fn begin(
         (drive, restorer): (&Drive, &Restorer),
         (model, loops): (&'static Description, &Loops),
-        lowers_gains: bool,
+        also: &[Mux],
         journal: Option<&Path>,
         on_kept: fn(&str),
     ) -> Result<Self, Failure> {
         drive.check_at_rest().await.map_err(source::refused)?;
-        let gains = [loops.speed_proportional, loops.speed_integral.object()];
+        let gains = speed_gains(loops);
         // Not changed, and looked at.
         let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
         let scaled = [loops.position_proportional, loops.speed_filter].into_iter().flatten().map(|it| it.object);
@@ -50,16 +50,16 @@ impl Setup {
         let ramps = loops.without_ramps.iter().map(|(object, _)| *object);
         let rows = model.dictionary.rows().iter().filter(|row| row.access.is_writable()).map(|row| row.mux());
         let pdos = rows.filter(|mux| PdoId::of_object(mux.index).is_some());
-        let changed: Vec<Mux> = ramps.chain(pdos).chain([MODES_OF_OPERATION]).collect();
+        let changed: Vec<Mux> = ramps.chain(pdos).chain([MODES_OF_OPERATION]).chain(also.iter().copied()).collect();
         let (mut before, mut written) = (BTreeMap::new(), BTreeMap::new());
-        for object in changed.iter().copied().chain(gains).chain(current).chain(others) {
+        let looked_at = gains.into_iter().chain(current).chain(others).filter(|object| !also.contains(object));
+        for object in changed.iter().copied().chain(looked_at) {
             match drive.node().upload(object).await {
                 Ok(value) => {
                     let value = value.as_bytes().to_vec();
                     // To write a mode of homing begins one on some drives.
                     let starts_homing = object == MODES_OF_OPERATION && value == [ModeOfOperation::HOMING.0 as u8];
-                    let changed = changed.contains(&object) && !starts_homing;
-                    if changed || lowers_gains && gains.contains(&object) {
+                    if changed.contains(&object) && !starts_homing {
                         written.insert(object, value.clone());
                     }
                     before.insert(object, value);
@@ -71,7 +71,6 @@ impl Setup {
         }
         let undo = from_any_state(Some(model), drive.node().id(), &written);
         keep((drive, restorer), journal, undo, on_kept).await?;
-        restorer.begin_motion(loops.demand.is_some());
         Ok(Self { model, loops: *loops, before, restorer: restorer.clone() })
     }
 
@@ -153,6 +152,11 @@ impl Setup {
             .because(undone)
             .next("power the drive off and on: nothing was stored"))
     }
+}
+
+/// The gains of the speed loop, which a measurement may lower.
+pub fn speed_gains(loops: &Loops) -> [Mux; 2] {
+    [loops.speed_proportional, loops.speed_integral.object()]
 }
 
 /// These writes lead back from what is going to be written: also a journal has them, if a place for it is named.

@@ -7,8 +7,7 @@ use can::Bitrate;
 use canopen::{Mux, NodeId};
 use devices::{AxisId, Description, Integral, Loops, Scale};
 use master::cyclic::CyclicOptions;
-use master::units::{Angle, Ramp, Rpm};
-use master::{Drive, MotionOptions, Network};
+use master::{Drive, Network};
 use serde::Serialize;
 use sim::machine::{Order, SpeedWorth, is_built_in, order};
 use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, StepperData, World};
@@ -16,18 +15,13 @@ use words::failure::Failure;
 
 use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
 use super::found::Found;
+use super::moves::{LOOKED_AT_S, MoveRow, TrialMove};
 use super::readings::{Currents, Reader};
 
 pub(super) const NODE: NodeId = NodeId::MIN;
 const BOOT: Duration = Duration::from_secs(1);
 /// How long the answer to a step and to a load is looked at.
 const ANSWER_S: f64 = 0.5;
-/// A move: the time that its way takes at its speed, that of its ramps, how long it is looked at, in ms, and the share of its way within
-/// which it has settled.
-const MOVE_S: f64 = 0.75;
-const RAMP_S: f64 = 0.25;
-const MOVE_MS: u32 = 2500;
-const WITHIN: f64 = 0.01;
 /// The load that comes on, by the current that holds it: a share of what is usual.
 const LOAD_SHARE: f64 = 0.3;
 /// The same of a motor with a reducer, at its output.
@@ -59,15 +53,6 @@ pub struct Trial {
     pub step: StepResponse,
     /// A load that comes on while it turns: the same, with no step.
     pub load: StepResponse,
-}
-
-/// How a move ended.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct MoveRow {
-    /// By how much the motor's shaft went beyond its target.
-    pub overshoot_deg: f64,
-    /// From the command until it stayed within 1 % of the way; `None` where it did not.
-    pub settled_s: Option<f64>,
 }
 
 impl Trial {
@@ -257,16 +242,7 @@ impl Twin {
     /// What stopped it.
     pub async fn try_move(&self, values: &[(Mux, i64)], highest_rpm: f64) -> Result<MoveRow, Failure> {
         let (mut world, drive) = self.booted(Fidelity::Full).await?;
-        let speed = 0.5 * highest_rpm;
-        let turns = MOVE_S * speed / 60.0;
-        let ramp = Some(Ramp::RpmPerSecond(speed / RAMP_S));
-        let options = MotionOptions {
-            speed: Some(Rpm(speed)),
-            acceleration: ramp,
-            deceleration: ramp,
-            wait: false,
-            ..MotionOptions::default()
-        };
+        let mut trial = TrialMove::new(highest_rpm);
         let angle = |world: &mut World| {
             let report = world.report(NODE.raw()).map_err(|error| self.failed(error))?;
             Ok::<f64, Failure>(report.shaft_angle_rad.to_degrees())
@@ -274,22 +250,15 @@ impl Twin {
         let from_deg = angle(&mut world)?;
         self.run(&mut world, async {
             self.write(&drive, values).await?;
-            Ok(drive.move_relative(Angle::Turns(turns), options).await?)
+            trial.begin(&drive, false).await
         })
         .await?;
-        let way_deg = turns * 360.0;
-        let mut row = MoveRow { overshoot_deg: 0.0, settled_s: None };
-        for ms in 1..=MOVE_MS {
+        let began = world.now();
+        while world.now() - began < Duration::from_secs_f64(LOOKED_AT_S) {
             sim::pass_beside(&mut world, Duration::from_millis(1)).await;
-            let left_deg = way_deg - (angle(&mut world)? - from_deg);
-            row.overshoot_deg = row.overshoot_deg.max(-left_deg);
-            if left_deg.abs() > WITHIN * way_deg {
-                row.settled_s = None;
-            } else {
-                row.settled_s = row.settled_s.or(Some(f64::from(ms) * 1e-3));
-            }
+            trial.see((world.now() - began).as_secs_f64(), angle(&mut world)? - from_deg);
         }
-        Ok(row)
+        Ok(trial.row())
     }
 
     async fn trial_of_samples(

@@ -12,8 +12,8 @@ use host::capture::Restorer;
 use host::network::Progress;
 use host::network::params::journal::roll_back_by;
 use host::tune::{
-    Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Trial, Twin, find, loops_of, measure, motor_of,
-    tune,
+    Bounds, Excursion, Found, Proposed, Request, Setup, StepResponse, Trial, TuneReport, Twin, find, loops_of, measure,
+    motor_of, speed_gains, tune,
 };
 use master::cyclic::CyclicOptions;
 use master::drive::{MotionOptions, SwitchedOff};
@@ -44,7 +44,9 @@ pub(crate) fn measured(
 ) -> Result<(Found, Setup), tune::Unusable> {
     let (model, loops) = loops_of(drive).unwrap();
     let run = async {
-        let setup = Setup::begin((drive, &Restorer::of(drive)), (model, loops), true, None, |_| ()).await.unwrap();
+        let setup = Setup::begin((drive, &Restorer::of(drive)), (model, loops), &speed_gains(loops), None, |_| ())
+            .await
+            .unwrap();
         let how = (PERIOD, bounds, CyclicOptions::default());
         let measured = measure(drive, &setup, loops, how, &mut Excursion::default()).await;
         (setup, measured)
@@ -217,7 +219,7 @@ fn current_and_travel_are_those_of_the_whole_measurement() {
     let mut excursion = Excursion::default();
     let run = async {
         let restorer = Restorer::of(&drive);
-        let setup = Setup::begin((&drive, &restorer), (model, loops), true, None, |_| ()).await.unwrap();
+        let setup = Setup::begin((&drive, &restorer), (model, loops), &speed_gains(loops), None, |_| ()).await.unwrap();
         let bounds = Bounds { travel_turns: 5.0, ..Bounds::default() };
         let how = (PERIOD, bounds, CyclicOptions::default());
         let first = host::tune::step((&drive, &restorer), &Request { bounds, ..request() }, 30.0, &mut excursion).await;
@@ -370,6 +372,33 @@ fn a_program_that_ends_before_the_new_gains_are_kept_leaves_the_former_ones_in_a
     assert_eq!(gains(&mut world, &drive), before);
     // Empty.
     std::fs::remove_dir(&folder).unwrap();
+}
+
+/// A way that takes three quarters of a second at its speed, with ramps of a quarter: a second, less the last hundredth of the way, and
+/// more by how late the shaft is. On the drive it is read by SDO.
+pub(crate) fn is_as_long_as_it_is_made(report: &TuneReport) {
+    let [twin, drive] = [report.twin_move.unwrap(), report.drive_move.unwrap()];
+    for settled_s in twin.iter().chain(&drive).map(|row| row.settled_s.unwrap()) {
+        assert!((0.85..1.3).contains(&settled_s), "{twin:?} {drive:?}");
+    }
+    for (twin, drive) in twin.iter().zip(&drive) {
+        assert!((twin.settled_s.unwrap() - drive.settled_s.unwrap()).abs() < 0.06, "{twin:?} {drive:?}");
+        assert!((twin.overshoot_deg - drive.overshoot_deg).abs() < 3.0, "{twin:?} {drive:?}");
+    }
+}
+
+#[test]
+fn a_position_loop_is_tried_on_the_drive_by_a_move_there_and_back() {
+    let (mut world, drive) = wheel(&["load inertia 0.05", "load friction 0.2 viscous 0.01"]).world().unwrap();
+    let profile = [0x6081, 0x6083, 0x6084, 0x6060].map(|index| Mux::new(index, 0));
+    let before = values(&mut world, &drive, &profile);
+    let (request, restorer) = (Request { apply: true, with_position: true, ..request() }, Restorer::of(&drive));
+    let run = tune((&drive, &restorer), &request, &(), std::future::ready(false));
+    let report = sim::block_on(&mut world, run).unwrap().unwrap();
+    assert!(report.applied, "{report:?}");
+    is_as_long_as_it_is_made(&report);
+    assert_eq!(values(&mut world, &drive, &profile), before);
+    assert!(restorer.is_done() && world.report(1).unwrap().velocity_rpm.abs() < 1.0);
 }
 
 /// Its friction holds it without power. What holds a load that pushes all the time is there beside the one that comes on: steady currents add up.

@@ -23,7 +23,15 @@ fn captured() -> Capture {
     let (mut world, drive) = plant.world().unwrap();
     let run = async {
         let (model, loops) = loops_of(&drive).unwrap();
-        let setup = Setup::begin((&drive, &Restorer::of(&drive)), (model, loops), true, None, |_| ()).await.unwrap();
+        let setup = Setup::begin(
+            (&drive, &Restorer::of(&drive)),
+            (model, loops),
+            &host::tune::speed_gains(loops),
+            None,
+            |_| (),
+        )
+        .await
+        .unwrap();
         let how = (Duration::from_millis(1), Bounds::default(), CyclicOptions::default());
         measure(&drive, &setup, loops, how, &mut Excursion::default()).await.unwrap().samples
     };

@@ -12,7 +12,7 @@ use master::units::Rpm;
 use sim::machine::TimingMode;
 use sim::{MotorData, Place, Prng, Stimulus};
 
-use crate::tune::{tried, with_constant};
+use crate::tune::{is_as_long_as_it_is_made, tried, with_constant};
 use crate::tune_random::{machines, moved, proposed};
 
 /// What the plant has at the motor's shaft: closed forms of its own equations (`plant::gear`).
@@ -154,6 +154,7 @@ fn a_joint_that_tries_its_new_gains_has_them_or_its_former_ones() {
     // "20000", as delivered.
     assert_eq!(ramp, 20_000);
     assert!(report.drive_error.is_some());
+    is_as_long_as_it_is_made(&report);
 }
 
 #[test]

@@ -103,6 +103,7 @@ class Tuning(TypedDict):
     twin_error: list[float]
     twin_move: Optional[list[dict[str, Optional[float]]]]
     drive_error: Optional[list[float]]
+    drive_move: Optional[list[dict[str, Optional[float]]]]
     applied: bool
     notes: list[str]
     response: list[dict[str, Any]]

@@ -416,12 +416,12 @@ fn three_digits(value: f64) -> String {
 }
 
 /// A move on the twin, before and after.
-fn moves([before, after]: &[MoveRow; 2]) -> String {
+fn moves(whose: &str, [before, after]: &[MoveRow; 2]) -> String {
     let text = |row: &MoveRow| {
         let settled = row.settled_s.map_or("does not settle".to_owned(), |at| format!("settled after {at:.2} s"));
         format!("{:.1} degrees beyond its end, {settled}", row.overshoot_deg)
     };
-    format!("a move on the twin: {} before; {} after", text(before), text(after))
+    format!("a move on the {whose}: {} before; {} after", text(before), text(after))
 }
 
 impl Report for TuneReport {
@@ -474,7 +474,8 @@ impl Report for TuneReport {
         lines.push(margins("speed loop, as it is ", &self.before));
         lines.push(margins("speed loop, proposed ", &self.after));
         lines.extend(self.position.iter().map(|row| margins("position loop around it", row)));
-        lines.extend(self.twin_move.iter().map(moves));
+        lines.extend(self.twin_move.iter().map(|rows| moves("twin", rows)));
+        lines.extend(self.drive_move.iter().map(|rows| moves("drive", rows)));
         let error = |[before, after]: [f64; 2]| format!("{before:.2} r/min s before, {after:.2} after");
         lines.push(format!("error after a step and a load, on the twin: {}", error(self.twin_error)));
         if let Some(errors) = self.drive_error {

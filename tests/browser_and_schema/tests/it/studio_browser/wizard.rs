@@ -98,7 +98,13 @@ async fn the_wizard_for_gains_shows_what_was_found_writes_it_and_goes_back() {
     stage.has_done("#tune-back", "#tune-status", "the drive has its former values, read back").await;
     stage.find("#tune-back[hidden]").await;
     assert_eq!(has().await, column(2), "as it was");
-    // Recorded with its limits; played, the trial waits for what the measurement finds.
+    a_recorded_tuning_is_played(&stage).await;
+    assert_ne!(has().await, column(2), "it has gains that were found");
+    stage.close().await;
+}
+
+/// Recorded with its limits; played, the trial waits for what the measurement finds.
+async fn a_recorded_tuning_is_played(stage: &Stage) {
     stage.click("#tabs [data-name=motion]").await;
     stage.click_for("#sequence-record", "#sequence-record[aria-pressed=false]").await;
     let recorded = stage.says(".sequence li:nth-last-child(2)", "Find gains for a phase margin of 40°").await;
@@ -127,6 +133,4 @@ async fn the_wizard_for_gains_shows_what_was_found_writes_it_and_goes_back() {
             are_kept
         })
         .await;
-    assert_ne!(has().await, column(2), "it has gains that were found");
-    stage.close().await;
 }
