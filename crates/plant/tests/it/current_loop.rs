@@ -69,7 +69,9 @@ fn a_loop_that_knows_its_motor_is_of_first_order_while_it_turns() {
         assert!(data.current_a.d.abs() < 1e-9, "step {n}: {} A across", data.current_a.d);
     }
     // What a winding with 2 A across its magnets takes, of which most is fed forward.
-    (0..400).for_each(|_| drop(step(&mut data, 27.4)));
+    for _ in 0..400 {
+        step(&mut data, 27.4);
+    }
     let omega = 27.4 * f64::from(MOTOR.pole_pairs);
     let expected_v =
         Dq { d: -omega * MOTOR.inductance_q_h * 2.0, q: MOTOR.resistance_ohm * 2.0 + omega * MOTOR.flux_linkage_wb };
