@@ -17,8 +17,9 @@ use sim::{StationId, World};
 use tokio::sync::Notify;
 use transport::{WallClock, waker_of};
 
-/// How finely the world follows the clock.
+/// How finely the world follows the clock while something happens in it, and while nothing does.
 const STEP: Duration = Duration::from_millis(1);
+const LONGEST: Duration = Duration::from_millis(20);
 
 /// How far it may fall behind and still catch up: far less than after which a page that says nothing is taken for gone. What a page
 /// said while the machine stood still is heard within this time of the world.
@@ -77,8 +78,8 @@ impl WorldBus {
                 return output;
             }
             // It has more to do at once. One that computes for long leaves time to pass between.
-            let has_more = is_notified(&woken);
-            if has_more && polls % AT_ONCE != 0 {
+            let mut is_due = is_notified(&woken);
+            if is_due && polls % AT_ONCE != 0 {
                 continue;
             }
             // It is polled again at the very instant at which something happens for it.
@@ -87,20 +88,26 @@ impl WorldBus {
                 if is_notified(&woken) {
                     break;
                 }
-                if is_now {
-                    self.attend(master);
-                    (polls, gave_way) = (0, self.world.now());
-                    if has_more {
-                        tokio::task::yield_now().await;
-                        break;
-                    }
-                    tokio::select! {
-                        biased;
-                        () = woken.notified() => break,
-                        () = wakeup.notified() => break,
-                        () = self.clock.sleep(STEP) => {}
-                    }
+                if !is_now {
+                    continue;
                 }
+                self.attend(master);
+                (polls, gave_way) = (0, self.world.now());
+                if is_due {
+                    tokio::task::yield_now().await;
+                    break;
+                }
+                let pause = self.until_next_event();
+                is_due = tokio::select! {
+                    biased;
+                    () = woken.notified() => true,
+                    () = wakeup.notified() => true,
+                    Some(asked) = self.asks.next() => {
+                        asked.answer(&mut self.world);
+                        false
+                    }
+                    () = self.clock.sleep(pause) => false,
+                };
             }
         }
     }
@@ -120,6 +127,12 @@ impl WorldBus {
             self.world.run_until(target);
         }
         true
+    }
+
+    /// How long nothing happens in the world, by the clock.
+    fn until_next_event(&self) -> Duration {
+        let at = self.world.next_event().and_then(|at| self.pace.elapsed_at(at));
+        at.map_or(LONGEST, |at| at.saturating_sub(elapsed(&self.clock))).clamp(STEP, LONGEST)
     }
 
     /// Answers what is asked of the world, and shows how its wire is.

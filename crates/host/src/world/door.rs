@@ -7,7 +7,7 @@ use serde_json::Value;
 use sim::recorder::LiveValues;
 use tokio::sync::{mpsc, oneshot};
 
-/// Queued requests; they are answered every millisecond.
+/// Queued requests.
 const MOST_WAITING: usize = 64;
 
 /// The host's end.
@@ -28,6 +28,9 @@ pub fn world_door(values: Option<LiveValues>) -> (WorldDoor, WorldAsks) {
 }
 
 /// A request, and the sender of its answer.
+#[derive(Debug)]
+pub struct Asked(Ask);
+
 #[derive(Debug)]
 enum Ask {
     Forms(oneshot::Sender<Vec<&'static str>>),
@@ -82,11 +85,23 @@ impl WorldAsks {
         self.0.blocking_recv().map(|ask| ask.answer(world)).is_some()
     }
 
+    /// The next request; `None` when no host is left.
+    pub async fn next(&mut self) -> Option<Asked> {
+        self.0.recv().await.map(Asked)
+    }
+
     /// Answers the queued requests.
     pub fn answer(&mut self, world: &mut impl Around) {
         while let Ok(ask) = self.0.try_recv() {
             ask.answer(world);
         }
+    }
+}
+
+impl Asked {
+    /// Answers it.
+    pub fn answer(self, world: &mut impl Around) {
+        self.0.answer(world);
     }
 }
 
