@@ -72,6 +72,8 @@ impl WorldBus {
             }
             polls += 1;
             let polled = until.as_mut().poll(&mut Context::from_waker(&waker));
+            // What it has changed itself is seen here.
+            let _ = is_notified(wakeup);
             self.world.refresh();
             if let Poll::Ready(output) = polled {
                 self.world.run_for(PARTING);

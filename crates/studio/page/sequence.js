@@ -178,6 +178,12 @@ const ROWS = {
     cli: ({ node }) => [LEFT_OUT(`node ${node}: gains that were found before this sequence are tried`)],
     python: ({ node }) => [LEFT_OUT(`node ${node}: gains that were found before this sequence are tried`)],
   },
+  roll_back: {
+    shown: () => "Back to the former values",
+    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.roll_back.shown()}`),
+    cli: ({ node }) => [LEFT_OUT(`node ${node}: ${ROWS.roll_back.shown()}`)],
+    python: ({ node }) => [LEFT_OUT(`node ${node}: ${ROWS.roll_back.shown()}`)],
+  },
 };
 
 /** The model of a node as a further argument, if it is known. */
@@ -271,7 +277,7 @@ function modelsOf(steps, models) {
 }
 
 /** Commands whose answer the next one may need: a play goes on behind it. */
-export const isAwaited = ({ do: word }) => word === "tune";
+export const isAwaited = ({ do: word }) => word === "tune" || word === "try_gains";
 
 /** Where a program has one command for gains that are found and tried: the trial is an option of the tuning. */
 function withTrials(steps) {
@@ -280,11 +286,13 @@ function withTrials(steps) {
   for (const step of steps) {
     const { do: word, node } = step.command;
     const tuning = tuningOf.get(node);
-    if (word === "try_gains" && tuning !== undefined) {
-      said[tuning] = { ...said[tuning], command: { ...said[tuning].command, applied: true } };
-      tuningOf.delete(node);
+    const { applied = false } = said[tuning]?.command ?? {};
+    // Gains that are put back at once were only found.
+    if (tuning !== undefined && word === (applied ? "roll_back" : "try_gains")) {
+      said[tuning] = { ...said[tuning], command: { ...said[tuning].command, applied: !applied } };
       continue;
     }
+    for (const one of nodesOf(step.command)) tuningOf.delete(one);
     if (word === "tune") tuningOf.set(node, said.length);
     said.push(step);
   }

@@ -54,6 +54,8 @@ export function tunePanel(shared, report) {
   let offered = null;
   /** An answer is awaited; the node whose values were written, for the way back. */
   let busy = false;
+  /** The trial has a move in it. */
+  let moves = false;
   let written = null;
   let state = { isMoved: false, drive: false };
 
@@ -173,7 +175,8 @@ export function tunePanel(shared, report) {
       ...result.notes.map((note) => h("p", { class: "quiet" }, note)),
     );
     write.hidden = result.drive_error !== null;
-    setText(write, "Write them, and have the drive try a step");
+    setText(write, `Write them, and have the drive try a step${result.twin_move ? " and a move" : ""}`);
+    moves = Boolean(result.twin_move);
     write.onclick = () => tryGains(node);
     back.hidden = !result.applied;
     written = result.applied ? node : null;
@@ -181,7 +184,7 @@ export function tunePanel(shared, report) {
 
   async function tryGains(node) {
     if (!risk.isAccepted()) return;
-    const result = await asked({ do: "try_gains", node }, `Node ${node}: a step with the gains that it has, and the same with those proposed …`);
+    const result = await asked({ do: "try_gains", node }, `Node ${node}: a step${moves ? " and a move there and back" : ""} with the gains that it has, and the same with those proposed …`);
     write.hidden = true;
     if (result) draw(node, result);
   }

@@ -204,6 +204,17 @@ test("a tuning has its limits in each form, and its trial as its option", () => 
   assert.match(scenario(tuned, [{ node: 4, model: "zlac8030l" }]), /^ {4}# left out: node 4: Find gains for a phase margin of 45°.*\n {4}"wait 40s",\n {4}# left out: node 4: Try the gains that were found last$/m);
 });
 
+test("gains that are put back at once were only found, and what stands between is not passed over", () => {
+  const [found, tried, stored] = tuned;
+  const back = { after_s: 1, command: { do: "roll_back", node: 4 } };
+  assert.deepEqual(keptSteps([found, tried, back]), [found, tried, back]);
+  assert.match(commandLine([found, tried, back], "can0"), /^ferrodrive tune 4 .* --period 5ms {2}# waits for its end\n$/m);
+  assert.match(commandLine([found, tried, back], "can0"), /^(?!.*left out)/s);
+  const between = commandLine([found, stored, tried], "can0");
+  assert.ok(!between.includes("--apply") && /save 4\nsleep 40\n# left out: node 4: gains/.test(between), between);
+  assert.match(python([back], "can0"), /^ {4}# left out: node 4: Back to the former values$/m);
+});
+
 test("a trial without its tuning is named, and a tuning without limits is not kept", () => {
   assert.match(commandLine(tuned.slice(1, 2), "can0"), /^# left out: node 4: gains that were found before/m);
   for (const name of ["current_a", "travel_turns", "period_ms"]) assert.deepEqual(keptSteps([{ after_s: 0, command: { ...tune, [name]: null } }]), [], name);

@@ -23,6 +23,9 @@ use crate::network::params::journal::Kept;
 const ANSWER_S: f64 = 0.5;
 /// By how much a drive may be worse than its twin.
 const MORE_THAN_TWIN: f64 = 1.3;
+/// How a drive answers a step, and how it moves, with what was seen once it was to stand.
+type Answers = (StepResponse, Option<(MoveRow, Option<Failure>)>);
+
 const BACK: &str = "it was given its former gains back";
 
 /// Measures a drive, finds gains, and has it [`try_gains`], if that was asked for. What leads back from where it is given up on the
@@ -56,7 +59,8 @@ fn check_no_former(request: &Request, id: NodeId) -> Result<(), Failure> {
     request.journal.as_deref().map(former_gains).map_or(Ok(()), |path| Kept::check_free(&path, id))
 }
 
-/// Has a drive try gains that were [found](find): a step with what it has, a transaction, the same step. It keeps them where its
+/// Has a drive try gains that were [found](find): a step with what it has, with the position loop a move there and back too, a
+/// transaction, and the same again. It keeps them where its
 /// current does not swing, its error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what
 /// it had.
 ///
@@ -75,17 +79,23 @@ pub async fn try_gains(
     let former = request.journal.as_deref().map(former_gains);
     check_no_former(request, id)?;
     check_unchanged(drive, &proposed).await?;
-    progress.show(format!("node {id}: a step with the gains that it has"));
+    let moves = request.with_position && can_move(drive, request);
+    if moves != request.with_position {
+        let why = "a move is not tried on this drive: it shows no speed or no current, or has no profile position";
+        report.notes.push(why.to_owned());
+    }
+    let tried = if moves { "a step and a move" } else { "a step" };
+    progress.show(format!("node {id}: {tried} with the gains that it has"));
     // The first thing that a step does to the current is proportional to it.
     let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
-    let before = trial((drive, restorer), request, most_rpm, excursion).await?;
+    let before = trial((drive, restorer), request, (most_rpm, moves), excursion).await?;
     let undo = proposed.gains.iter().map(|gain| (gain.object, bytes(drive, gain.object, gain.before))).collect();
     // Until the new gains are kept or gone: whatever ends the program meanwhile.
     keep((drive, restorer), former.as_deref(), undo, request.on_kept).await?;
     let after = match write(drive, request, &proposed, progress).await {
         Ok(()) => {
-            progress.show(format!("node {id}: the same step with the new gains"));
-            trial((drive, restorer), request, most_rpm, excursion).await
+            progress.show(format!("node {id}: the same with the new gains"));
+            trial((drive, restorer), request, (most_rpm, moves), excursion).await
         }
         Err(failure) => Err(failure),
     };
@@ -117,8 +127,8 @@ pub async fn try_gains(
 
 /// Why the new gains do not stay, after a trial with the former ones and one with them; it is noted in the report.
 async fn judged(
-    (before, move_before): (StepResponse, Option<MoveRow>),
-    after: Result<(StepResponse, Option<MoveRow>), Failure>,
+    (before, move_before): Answers,
+    after: Result<Answers, Failure>,
     request: &Request,
     report: &mut TuneReport,
     wants_back: impl Future<Output = bool>,
@@ -129,7 +139,11 @@ async fn judged(
         false => failure,
     })?;
     report.drive_error = Some([before.error(), after.error()]);
-    report.drive_move = move_before.zip(move_after).map(<[MoveRow; 2]>::from);
+    if let Some((_, Some(seen))) = &move_after {
+        let what = "with the new gains the shaft was not seen to stand while they held it, and stands without power";
+        report.notes.push(format!("{what}: {seen}"));
+    }
+    report.drive_move = move_before.zip(move_after).map(|((before, _), (after, _))| [before, after]);
     let why = objection(&before, &after, request, report).or_else(|| {
         let [before, after] = report.drive_move?;
         let twin = report.twin_move.map(|[_, after]| after);
@@ -146,12 +160,16 @@ async fn judged(
 async fn trial(
     on: (&Drive, &Restorer),
     request: &Request,
-    most_rpm: f64,
+    (most_rpm, moves): (f64, bool),
     excursion: &mut Excursion,
-) -> Result<(StepResponse, Option<MoveRow>), Failure> {
+) -> Result<Answers, Failure> {
     let answer = step(on, request, most_rpm, excursion).await?;
-    let moved = if request.with_position { Some(move_there_and_back(on, request, excursion).await?) } else { None };
+    let moved = if moves { Some(move_there_and_back(on, request, excursion).await?) } else { None };
     Ok((answer, moved))
+}
+
+fn can_move(drive: &Drive, request: &Request) -> bool {
+    TrialMove::is_possible(drive) && Reader::of(drive, request.bounds, Excursion::default()).is_ok()
 }
 
 /// What is led back to are the gains that were measured: nothing has written others since.
@@ -231,7 +249,8 @@ pub async fn step(
     both(answer, setup.put_back(drive).await)
 }
 
-/// How the drive itself moves with the gains that it has, there and back. What was written for that is put back.
+/// How the drive itself moves with the gains that it has, there and back; and what was seen of a shaft that came to stand without power
+/// alone. What was written for that is put back.
 ///
 /// # Errors
 /// What stopped it, and that not everything could be put back.
@@ -239,7 +258,7 @@ pub async fn move_there_and_back(
     (drive, restorer): (&Drive, &Restorer),
     request: &Request,
     excursion: &mut Excursion,
-) -> Result<MoveRow, Failure> {
+) -> Result<(MoveRow, Option<Failure>), Failure> {
     let (model, loops) = loops_of(drive)?;
     let mut reader = Reader::of(drive, request.bounds, *excursion)?;
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
@@ -250,7 +269,10 @@ pub async fn move_there_and_back(
         reader.guard(request.cyclic.guard).await?;
         let row = reader.moves(TrialMove::new(request.bounds.speed_rpm)).await;
         *excursion = reader.excursion;
-        both(row, reader.stop().await)
+        match reader.stop_and_let_go().await {
+            Ok(seen) => row.map(|row| (row, seen)),
+            Err(failure) => both(row.map(|row| (row, None)), Err(failure)),
+        }
     };
     let row = row.await;
     both(row, setup.put_back(drive).await)

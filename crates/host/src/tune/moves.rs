@@ -1,7 +1,7 @@
 //! A move by the drive's own ramps: how it ends with some gains, on a twin and on the drive itself.
 
 use canopen::Mux;
-use cia402::object::{PROFILE_ACCELERATION, PROFILE_DECELERATION, PROFILE_VELOCITY};
+use cia402::object::{PROFILE_ACCELERATION, PROFILE_DECELERATION, PROFILE_VELOCITY, TARGET_POSITION};
 use master::units::{Angle, Ramp, Rpm};
 use master::{Drive, MotionOptions};
 use serde::Serialize;
@@ -40,6 +40,12 @@ impl TrialMove {
         let speed_rpm = 0.5 * highest_rpm;
         let row = MoveRow { overshoot_deg: 0.0, settled_s: None };
         Self { speed_rpm, way_deg: WAY_S * speed_rpm / 60.0 * 360.0, row }
+    }
+
+    /// Whether a drive has what it takes: profile position.
+    pub(super) fn is_possible(drive: &Drive) -> bool {
+        let has = |object| drive.description().is_some_and(|model| model.row(object).is_some());
+        has(TARGET_POSITION) && has(PROFILE_VELOCITY)
     }
 
     /// Begins it, or the way back.
@@ -82,8 +88,8 @@ impl MoveRow {
         more_than_twin: f64,
         highest_rpm: f64,
     ) -> Option<String> {
-        let unsettled = self.settled_s.is_none() && before.settled_s.is_some();
-        if unsettled {
+        let settles = |row: &Self| row.settled_s.is_some();
+        if !settles(self) && (settles(before) || twin.is_some_and(settles)) {
             return Some("a move does not settle with the new gains".to_owned());
         }
         let of_twin_deg = twin.map_or(0.0, |twin| more_than_twin * twin.overshoot_deg);
@@ -91,5 +97,30 @@ impl MoveRow {
         (self.overshoot_deg > most_deg).then(|| {
             format!("a move goes {:.1} degrees beyond with the new gains, more than {most_deg:.1}", self.overshoot_deg)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_move_that_does_not_settle_or_goes_far_beyond_is_objected_to() {
+        let row = |overshoot_deg, settled_s| MoveRow { overshoot_deg, settled_s };
+        let (good, unsettled) = (row(1.0, Some(0.9)), row(1.0, None));
+        let objection =
+            |after: MoveRow, before: &MoveRow, twin: &MoveRow| after.objection(before, Some(twin), 1.3, 120.0);
+        assert_eq!(objection(good, &good, &good), None);
+        let why = objection(unsettled, &good, &unsettled).unwrap_or_default();
+        assert!(why.contains("does not settle"), "{why}");
+        assert!(objection(unsettled, &unsettled, &good).is_some(), "its twin does");
+        assert_eq!(objection(unsettled, &unsettled, &unsettled), None, "as before, and as on its twin");
+        // A hundredth of three quarters of a turn; what it did before; 1.3 times what its twin does.
+        for (before, twin, most) in [(0.0, 0.0, 2.7), (5.0, 0.0, 5.0), (0.0, 5.0, 6.5)] {
+            let (before, twin) = (row(before, Some(0.9)), row(twin, Some(0.9)));
+            assert_eq!(objection(row(most - 0.01, Some(0.9)), &before, &twin), None);
+            let why = objection(row(most + 0.01, Some(0.9)), &before, &twin).unwrap_or_default();
+            assert!(why.contains("degrees beyond"), "{why}");
+        }
     }
 }

@@ -256,20 +256,33 @@ impl Reader {
     /// # Errors
     /// It was not seen to stand.
     pub async fn stop(self) -> Result<(), Failure> {
+        self.stop_and_let_go().await?.map_or(Ok(()), Err)
+    }
+
+    /// The same. What was seen of a shaft that stands without power and did not under it: one that high gains hold may show counts
+    /// of its encoder as a speed.
+    ///
+    /// # Errors
+    /// It was not seen to stand without power.
+    pub(super) async fn stop_and_let_go(self) -> Result<Option<Failure>, Failure> {
         let node = self.drive.node().id();
         let stood = self.drive.stop().await.map_err(|error| {
             let unseen = Failure::new(NotAtRest::NotSeen { node }.to_string()).of_kind("not_stopped").at_node(node);
             unseen.next(format!("ferrodrive estop, and ferrodrive explain {node}")).after(error.into())
         });
-        // A load may turn a shaft without power: it is looked at once more. One that high gains hold may show counts of its encoder as a
-        // speed, and stands without power.
-        let stood = bring_to_rest(&self.drive).await.or_else(|failure| both(Err(failure), stood));
+        // A load may turn a shaft without power: it is looked at once more.
+        let stood = match bring_to_rest(&self.drive).await {
+            Ok(()) => Ok(stood.err()),
+            Err(failure) => both(Err(failure), stood),
+        };
         if !self.is_guarded {
             return stood;
         }
         // One that may still be moving gets no further sign of life, and is left to its own watch.
         let network = self.drive.node().network();
-        stood.and(network.release_guards([node].into_iter().collect()).await.map_err(Failure::from))
+        let stood = stood?;
+        network.release_guards([node].into_iter().collect()).await?;
+        Ok(stood)
     }
 }
 

@@ -236,6 +236,9 @@ fn stood_after(name: &str, what: Moved, end: End) -> Option<Duration> {
     }
     let before = bench.world.report(NODE).unwrap().velocity_rpm.abs();
     assert!(before > 5.0, "{said}: {before} r/min before its end");
+    // Also where it stands at its target before that acts.
+    let (id, watch) = (drive.node().id(), devices::model(name).unwrap().host_watch);
+    assert_eq!(bench.network.guarded(id).is_some(), watch != HostWatch::None, "{said}: its watch is armed");
     // Beside it all others happen while the motion is still awaited.
     if end == End::StopAll {
         moving = None;
@@ -249,7 +252,6 @@ fn stood_after(name: &str, what: Moved, end: End) -> Option<Duration> {
     if let Some(moving) = moving.as_mut() {
         let _ = poke(moving.as_mut());
     }
-    let watch = devices::model(name).unwrap().host_watch;
     let silent = matches!(end, End::Killed | End::CableCut) || end == End::Frozen && !what.is_in_cycles(name);
     if silent && watch == HostWatch::None {
         let stood = bench.time_to_standstill(Duration::from_secs(6));

@@ -401,6 +401,21 @@ fn a_position_loop_is_tried_on_the_drive_by_a_move_there_and_back() {
     assert!(restorer.is_done() && world.report(1).unwrap().velocity_rpm.abs() < 1.0);
 }
 
+/// With this margin, and next to no friction, the loop swings by the counts of its encoder where the shaft turns slowly.
+#[test]
+fn gains_with_which_a_move_takes_too_much_current_are_not_kept() {
+    let (mut world, drive) = wheel(&["load inertia 0.05"]).world().unwrap();
+    let before = gains(&mut world, &drive);
+    let (request, restorer) = (Request { apply: true, with_position: true, ..request() }, Restorer::of(&drive));
+    let run = tune((&drive, &restorer), &request, &(), std::future::ready(false));
+    let failure = sim::block_on(&mut world, run).unwrap().unwrap_err();
+    let text = failure.to_string();
+    assert!(failure.kind == "current_bound" && text.contains("it was given its former gains back"), "{text}");
+    assert!(failure.next.iter().any(|next| next.contains("--phase-margin 50")), "{failure:?}");
+    assert_eq!(gains(&mut world, &drive), before);
+    assert!(restorer.is_done() && world.report(1).unwrap().velocity_rpm.abs() < 1.0);
+}
+
 /// Its friction holds it without power. What holds a load that pushes all the time is there beside the one that comes on: steady currents add up.
 #[test]
 fn a_load_that_pushes_all_the_time_pushes_the_twin_too() {
