@@ -23,10 +23,10 @@ use crate::network::params::journal::Kept;
 const ANSWER_S: f64 = 0.5;
 /// By how much a drive may be worse than its twin.
 const MORE_THAN_TWIN: f64 = 1.3;
-/// How a drive answers a step, and how it moves, with what was seen once it was to stand.
-type Answers = (StepResponse, Option<(MoveRow, Option<Failure>)>);
-
 const BACK: &str = "it was given its former gains back";
+
+/// How a drive answers a step, and how it moves, with what was seen of a shaft that came to stand without power alone.
+type Answers = (StepResponse, Option<(MoveRow, Option<Failure>)>);
 
 /// Measures a drive, finds gains, and has it [`try_gains`], if that was asked for. What leads back from where it is given up on the
 /// way is in `restorer`.
@@ -60,9 +60,8 @@ fn check_no_former(request: &Request, id: NodeId) -> Result<(), Failure> {
 }
 
 /// Has a drive try gains that were [found](find): a step with what it has, with the position loop a move there and back too, a
-/// transaction, and the same again. It keeps them where its
-/// current does not swing, its error is not larger, and `wants_back` is false, which is asked last. Else the drive has in the end what
-/// it had.
+/// transaction, and the same again. It keeps them where its current does not swing, its error is not larger, a move settles and goes no
+/// farther beyond, and `wants_back` is false, which is asked last. Else the drive has in the end what it had.
 ///
 /// # Errors
 /// What stopped it, that its gains are others than those that were measured, that a journal of former gains is there already, and that

@@ -374,12 +374,13 @@ fn a_program_that_ends_before_the_new_gains_are_kept_leaves_the_former_ones_in_a
     std::fs::remove_dir(&folder).unwrap();
 }
 
-/// A way that takes three quarters of a second at its speed, with ramps of a quarter: a second, less the last hundredth of the way, and
-/// more by how late the shaft is. On the drive it is read by SDO.
+/// A way that takes three quarters of a second at its speed, with ramps of a quarter: a second. The last hundredth of the way takes 0.06 s
+/// of it with straight ramps, and 0.09 s with joined parabolas; a shaft is late, and one that goes beyond is there sooner. On the drive it
+/// is read by SDO.
 pub(crate) fn is_as_long_as_it_is_made(report: &TuneReport) {
     let [twin, drive] = [report.twin_move.unwrap(), report.drive_move.unwrap()];
     for settled_s in twin.iter().chain(&drive).map(|row| row.settled_s.unwrap()) {
-        assert!((0.85..1.3).contains(&settled_s), "{twin:?} {drive:?}");
+        assert!((0.85..1.05).contains(&settled_s), "{twin:?} {drive:?}");
     }
     for (twin, drive) in twin.iter().zip(&drive) {
         assert!((twin.settled_s.unwrap() - drive.settled_s.unwrap()).abs() < 0.06, "{twin:?} {drive:?}");

@@ -415,7 +415,7 @@ fn three_digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A move on the twin, before and after.
+/// A move on the twin or on the drive, before and after.
 fn moves(whose: &str, [before, after]: &[MoveRow; 2]) -> String {
     let text = |row: &MoveRow| {
         let settled = row.settled_s.map_or("does not settle".to_owned(), |at| format!("settled after {at:.2} s"));

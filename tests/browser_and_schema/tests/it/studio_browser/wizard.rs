@@ -24,7 +24,7 @@ impl Stage {
         self.find("#tune").await;
         self.script("document.getElementById('tune').open = true").await;
         self.says("#tune-warning", "120 r/min at most").await;
-        // Its trial stays far from the bound of the current, whatever the measurement finds within what it may be off by.
+        // Another wish than the usual one.
         let margin = "const field = document.querySelector('#tune-gains-phase_margin_deg'); field.value = '60'; field.dispatchEvent(new Event('change'))";
         self.script(margin).await;
     }
