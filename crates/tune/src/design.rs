@@ -148,13 +148,14 @@ impl Margins {
     }
 }
 
-/// Gains for a speed loop. `filters_s` are time constants that the drive's filter of its speed can have; each factor of the gains
-/// is one that `can_hold` takes. `None` where not even the smallest gains keep the margins.
+/// Gains for a speed loop whose gain falls to one below `most_hz`: where the shaft was not seen to follow, nothing is known of it.
+/// `filters_s` are time constants that the drive's filter of its speed can have; each factor of the gains is one that `can_hold` takes.
+/// `None` where not even the smallest gains keep the margins.
 pub fn propose(
     mechanics: &Mechanics,
     around: &Loop,
     objective: Objective,
-    highest_hz: f64,
+    (most_hz, highest_hz): (f64, f64),
     filters_s: &[f64],
     can_hold: impl Fn(f64, f64) -> bool,
 ) -> Option<Proposal> {
@@ -177,7 +178,7 @@ pub fn propose(
                     continue;
                 }
                 let margins = margins(mechanics, &candidate, highest_hz);
-                if !margins.keeps(phase_deg) {
+                if !margins.keeps(phase_deg) || margins.crossover_hz > most_hz {
                     continue;
                 }
                 let worth = match objective {
@@ -287,19 +288,22 @@ mod tests {
         Loop { proportional: 0.5, integral: 1.0, filter_s: 1e-3, asked_late_s: 1e-3, seen_late_s: 1e-3, off: 0.0 };
 
     #[test]
-    fn a_phase_margin_is_kept_and_a_greater_one_makes_the_loop_slower() {
-        let of = |degrees| {
-            propose(&MECHANICS, &AROUND, Objective::PhaseMargin(degrees), 1000.0, &[1e-3], |_, _| true).unwrap()
+    fn a_phase_margin_is_kept_and_a_greater_one_or_a_shaft_that_is_seen_less_makes_the_loop_slower() {
+        let of = |degrees, most_hz| {
+            propose(&MECHANICS, &AROUND, Objective::PhaseMargin(degrees), (most_hz, 1000.0), &[1e-3], |_, _| true)
+                .unwrap()
         };
-        let (fast, slow) = (of(45.0), of(70.0));
+        let (fast, slow, blind) = (of(45.0, 1000.0), of(70.0, 1000.0), of(45.0, 10.0));
         assert!(fast.margins.phase_deg >= 45.0 && slow.margins.phase_deg >= 70.0, "{fast:?} {slow:?}");
         assert!(fast.margins.crossover_hz > slow.margins.crossover_hz, "{fast:?} {slow:?}");
+        assert!(fast.margins.crossover_hz > 10.0 && (5.0..=10.0).contains(&blind.margins.crossover_hz), "{blind:?}");
     }
 
     #[test]
     fn a_bandwidth_is_met_or_said_to_be_limited_and_gains_that_the_drive_cannot_hold_are_not_proposed() {
         let of = |hz, most: f64| {
-            propose(&MECHANICS, &AROUND, Objective::Bandwidth(hz), 1000.0, &[1e-3], |kp, _| kp <= most).unwrap()
+            propose(&MECHANICS, &AROUND, Objective::Bandwidth(hz), (1000.0, 1000.0), &[1e-3], |kp, _| kp <= most)
+                .unwrap()
         };
         let met = of(10.0, 100.0);
         assert!((met.margins.crossover_hz / 10.0 - 1.0).abs() < 0.1 && !met.is_limited, "{met:?}");

@@ -22,6 +22,8 @@ use crate::samples::{Samples, Unusable};
 /// Coherence from which a frequency counts. What is less coherent weighs less, and where the motor hardly moves, at an
 /// anti-resonance, all is.
 pub(crate) const COHERENT: f64 = 0.5;
+/// What a linear model can be expected to be true to, relative.
+pub(crate) const DEVIATION: f64 = 0.01;
 /// How probable a coherence is, from which a frequency is taken to be seen, where nothing follows from the excitation.
 const CHANCE: f64 = 0.01;
 /// How many frequencies it takes to say anything.
@@ -69,7 +71,7 @@ impl Line {
     /// table 9.6), never below what a linear model can be expected to be true to.
     pub(crate) fn deviation(&self, averages: usize) -> f64 {
         let noise = (1.0 - self.coherence).max(0.0) / (2.0 * averages as f64 * self.coherence.max(1e-9));
-        (noise + 0.01 * 0.01).sqrt()
+        (noise + DEVIATION * DEVIATION).sqrt()
     }
 }
 
@@ -191,7 +193,7 @@ fn averaged(samples: &Samples) -> Result<Response, Unusable> {
 /// By how much a position that follows a current twice integrated is less than it would be if the current did not stand
 /// still between two samples: half an angle of a sample, squared, by that of the discrete double integrator
 /// (K. J. Åström, B. Wittenmark, "Computer-Controlled Systems", 3rd edition, table 2.1). The time is in the delay.
-fn held(half: f64) -> f64 {
+pub(crate) fn held(half: f64) -> f64 {
     if half == 0.0 { 1.0 } else { half.cos() * (half / half.sin()).powi(2) }
 }
 

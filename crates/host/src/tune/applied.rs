@@ -25,8 +25,14 @@ const ANSWER_S: f64 = 0.5;
 const MORE_THAN_TWIN: f64 = 1.3;
 const BACK: &str = "it was given its former gains back";
 
-/// How a drive answers a step, and how it moves, with what was seen of a shaft that came to stand without power alone.
-type Answers = (StepResponse, Option<(MoveRow, Option<Failure>)>);
+/// What a drive does in a trial.
+struct Answers {
+    step: StepResponse,
+    /// What its current does where it turns slowly, A.
+    slow_ripple_a: f64,
+    /// How it moves, with what was seen of a shaft that came to stand without power alone.
+    moved: Option<(MoveRow, Option<Failure>)>,
+}
 
 /// Measures a drive, finds gains, and has it [`try_gains`], if that was asked for. What leads back from where it is given up on the
 /// way is in `restorer`.
@@ -126,45 +132,46 @@ pub async fn try_gains(
 
 /// Why the new gains do not stay, after a trial with the former ones and one with them; it is noted in the report.
 async fn judged(
-    (before, move_before): Answers,
+    before: Answers,
     after: Result<Answers, Failure>,
     request: &Request,
     report: &mut TuneReport,
     wants_back: impl Future<Output = bool>,
 ) -> Result<Option<String>, Failure> {
     // Gains that were not seen to hold the shaft do not stay, whatever stopped it.
-    let (after, move_after) = after.map_err(|failure| match failure.kind == CURRENT_KIND {
+    let after = after.map_err(|failure| match failure.kind == CURRENT_KIND {
         true => failure.next("ask for gains that take less, e.g. --phase-margin 50"),
         false => failure,
     })?;
-    report.drive_error = Some([before.error(), after.error()]);
-    if let Some((_, Some(seen))) = &move_after {
+    report.drive_error = Some([before.step.error(), after.step.error()]);
+    if let Some((_, Some(seen))) = &after.moved {
         let what = "with the new gains the shaft was not seen to stand while they held it, and stands without power";
         report.notes.push(format!("{what}: {seen}"));
     }
-    report.drive_move = move_before.zip(move_after).map(|((before, _), (after, _))| [before, after]);
+    let moves = before.moved.as_ref().zip(after.moved.as_ref());
+    report.drive_move = moves.map(|((before, _), (after, _))| [*before, *after]);
     let why = objection(&before, &after, request, report).or_else(|| {
         let [before, after] = report.drive_move?;
         let twin = report.twin_move.map(|[_, after]| after);
         after.objection(&before, twin.as_ref(), MORE_THAN_TWIN, request.bounds.speed_rpm)
     });
-    report.curves.drive = Some([before, after]);
+    report.curves.drive = Some([before.step, after.step]);
     Ok(match why {
         None if wants_back.await => Some(BACK.to_owned()),
         why => why.map(|why| format!("{why}: {BACK}")),
     })
 }
 
-/// A step, and a move where the position loop was asked for, with the gains that it has.
+/// A step, a slow speed, and a move where the position loop was asked for, with the gains that it has.
 async fn trial(
     on: (&Drive, &Restorer),
     request: &Request,
     (most_rpm, moves): (f64, bool),
     excursion: &mut Excursion,
 ) -> Result<Answers, Failure> {
-    let answer = step(on, request, most_rpm, excursion).await?;
+    let (step, slow_ripple_a) = step(on, request, most_rpm, excursion).await?;
     let moved = if moves { Some(move_there_and_back(on, request, excursion).await?) } else { None };
-    Ok((answer, moved))
+    Ok(Answers { step, slow_ripple_a, moved })
 }
 
 fn can_move(drive: &Drive, request: &Request) -> bool {
@@ -192,31 +199,38 @@ fn noted(what_is: &str, Failure { what, because, next, .. }: Failure) -> String 
 }
 
 /// Why the new gains do not stay.
-fn objection(before: &StepResponse, after: &StepResponse, request: &Request, report: &TuneReport) -> Option<String> {
+fn objection(before: &Answers, after: &Answers, request: &Request, report: &TuneReport) -> Option<String> {
+    let usual_a = SWINGS * request.bounds.current_a;
+    let swings = |ripple_a: f64, most_a: f64, when: &str| {
+        let text =
+            || format!("its current swings by {ripple_a:.2} A {when} with the new gains, more than {most_a:.2} A");
+        (ripple_a > most_a).then(text)
+    };
     // The encoder's counts make the current ripple with high gains: on the twin as on the drive.
     let of_twin_a = MORE_THAN_TWIN * report.curves.twin[1].step.ripple_a();
-    let most_a = before.ripple_a().max(SWINGS * request.bounds.current_a).max(of_twin_a);
+    let slow_a = MORE_THAN_TWIN * before.slow_ripple_a.max(usual_a);
     // A drive that is to be slower than it was may be off by more.
     let most_error = match request.objective {
-        Objective::PhaseMargin(_) => before.error(),
+        Objective::PhaseMargin(_) => before.step.error(),
         Objective::Bandwidth(_) => {
             let size = |answer: &StepResponse| answer.step_rpm.1 - answer.step_rpm.0;
-            let of_twin = report.curves.twin[1].step.error() * size(after) / size(&report.curves.twin[1].step);
-            before.error().max(MORE_THAN_TWIN * of_twin)
+            let of_twin = report.curves.twin[1].step.error() * size(&after.step) / size(&report.curves.twin[1].step);
+            before.step.error().max(MORE_THAN_TWIN * of_twin)
         }
     };
-    if after.ripple_a() > most_a {
-        return Some(format!(
-            "its current swings by {:.2} A with the new gains, more than {most_a:.2} A",
-            after.ripple_a()
-        ));
-    }
-    (after.error() > most_error).then(|| {
-        format!("its error after a step is {:.2} r/min s with the new gains, more than {most_error:.2}", after.error())
-    })
+    let error = after.step.error();
+    let is_off = || {
+        let text =
+            || format!("its error after a step is {error:.2} r/min s with the new gains, more than {most_error:.2}");
+        (error > most_error).then(text)
+    };
+    swings(after.step.ripple_a(), before.step.ripple_a().max(usual_a).max(of_twin_a), "after a step")
+        .or_else(|| swings(after.slow_ripple_a, slow_a, "at a slow speed"))
+        .or_else(is_off)
 }
 
-/// How the drive itself answers a step of its set-point, of this size at most, with the gains that it has. What was written for that is put back.
+/// How the drive itself answers a step of its set-point, of this size at most, with the gains that it has, and by how much its current
+/// swings at a slow speed, A: 0 where that is not seen. What was written for that is put back.
 ///
 /// # Errors
 /// What stopped it, and that not everything could be put back.
@@ -225,7 +239,7 @@ pub async fn step(
     request: &Request,
     most_rpm: f64,
     excursion: &mut Excursion,
-) -> Result<StepResponse, Failure> {
+) -> Result<(StepResponse, f64), Failure> {
     let (model, loops) = loops_of(drive)?;
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
     let setup = Setup::begin((drive, restorer), (model, loops), &[], journal, on_kept).await?;
@@ -237,10 +251,13 @@ pub async fn step(
             reader.guard(request.cyclic.guard).await?;
             let answer = reader.step_response(most_rpm, Duration::from_secs_f64(ANSWER_S)).await;
             *excursion = reader.excursion;
-            return both(answer, reader.stop().await);
+            return both(answer.map(|answer| (answer, 0.0)), reader.stop().await);
         }
         let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic, *excursion).await?;
-        let answer = bench.step_response(most_rpm, ANSWER_S).await;
+        let answer = match bench.step_response(most_rpm, ANSWER_S).await {
+            Ok(step) => bench.slow_ripple_a().await.map(|slow_ripple_a| (step, slow_ripple_a)),
+            Err(failure) => Err(failure),
+        };
         *excursion = bench.excursion;
         both(answer, bench.stop().await)
     };

@@ -139,6 +139,8 @@ const STEADY_S: f64 = 0.6;
 const STEADY_SHARES: [f64; 6] = [0.35, -0.35, 1.0, -1.0, 0.65, -0.65];
 /// Speed on which the excitation lies, as a share of the highest: the shaft never turns back, where dry friction would change its sign.
 const BIAS_SHARE: f64 = 0.5;
+/// Slow, as a share of the highest speed.
+const SLOW_SHARE: f64 = 0.01;
 /// The excitation's peak, as a share of the highest speed: to begin with, and at most.
 const SMALL: f64 = 0.08;
 const LARGEST: f64 = 0.4;
@@ -351,6 +353,14 @@ impl Bench {
     pub async fn swings(&mut self) -> Result<bool, Failure> {
         let (_, ripple_a) = self.steady(BIAS_SHARE * self.bounds.speed_rpm).await?;
         Ok(ripple_a > SWINGS * self.bounds.current_a)
+    }
+
+    /// What the current does at a slow steady speed, where the encoder's counts come one by one: its root mean square about its mean, A.
+    ///
+    /// # Errors
+    /// See [`follow`](Self::follow).
+    pub async fn slow_ripple_a(&mut self) -> Result<f64, Failure> {
+        Ok(self.steady(SLOW_SHARE * self.bounds.speed_rpm).await?.1)
     }
 
     /// Steady speeds, then an excitation that grows until it is seen well, within the bounds.

@@ -44,11 +44,11 @@ impl Found {
             _ => None,
         };
         let filter_s = loops.speed_filter.and_then(value).unwrap_or(0.0);
-        let around = tune::identify_loop(&response, filter_s)?;
+        let plant = tune::identify(&response)?;
+        let around = tune::identify_loop(&response, &plant, filter_s)?;
         let (proportional, integral) = setup.shares(measured.gain_share);
         let own =
             Loop { proportional: around.proportional / proportional, integral: around.integral / integral, ..around };
-        let plant = tune::identify(&response)?;
         let current = loops.current.and_then(|(kp, ki)| value(kp).zip(value(ki)));
         let response = current.map_or_else(
             || response.clone(),
@@ -78,6 +78,11 @@ impl Found {
     /// Viscous friction at the motor's shaft.
     pub fn viscous_nm_s(&self) -> f64 {
         self.friction.viscous_a_s_rad * self.torque_constant_nm_a
+    }
+
+    /// The highest frequency at which the shaft was seen to follow, Hz; infinite where it is described and not measured.
+    pub fn seen_hz(&self) -> f64 {
+        self.response.as_ref().map_or(f64::INFINITY, |seen| seen.coherent().last().map_or(0.0, |line| line.hz))
     }
 
     /// What comes late in the speed loop, from the current that it asks for to the speed that it compares, its filter apart.

@@ -87,7 +87,7 @@ pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Resul
     }
     let response = tune::response(&samples, None).map_err(|error| failed(&error))?;
     let found = tune::identify(&response).map_err(|error| failed(&error))?;
-    let own = (!samples.set_point_rad_s.is_empty()).then(|| tune::identify_loop(&response, 0.0).ok()).flatten();
+    let own = (!samples.set_point_rad_s.is_empty()).then(|| tune::identify_loop(&response, &found, 0.0).ok()).flatten();
     if own.is_none() {
         notes.push(
             "without the set-point noise in the loop biases the response: capture velocity_demand too".to_owned(),

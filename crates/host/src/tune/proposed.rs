@@ -75,7 +75,7 @@ pub enum Unreachable {
 }
 
 impl Proposed {
-    /// Gains for an objective.
+    /// Gains for an objective, with which the gain of the speed loop falls to one below this frequency in Hz.
     ///
     /// # Errors
     /// Why there are none.
@@ -83,7 +83,7 @@ impl Proposed {
         found: &Found,
         setup: &Setup,
         (model, loops): (&'static Description, &Loops),
-        objective: Objective,
+        (objective, most_hz): (Objective, f64),
         with_position: bool,
     ) -> Result<Self, Unreachable> {
         let own = &found.own;
@@ -91,7 +91,7 @@ impl Proposed {
         let speed = SpeedObjects::of(setup, loops)?;
         let filters_s = speed.filters_s(own.filter_s);
         let search = |can_hold: &dyn Fn(f64, f64) -> bool| {
-            tune::propose(&found.plant, own, objective, highest_hz, &filters_s, can_hold)
+            tune::propose(&found.plant, own, objective, (most_hz, highest_hz), &filters_s, can_hold)
         };
         let out_of_range = || {
             let (proportional, integral) = (speed.proportional.0, speed.integral.0);
@@ -138,6 +138,11 @@ impl Proposed {
             position,
             is_limited: proposal.is_limited,
         })
+    }
+
+    /// Objects and proposed values.
+    pub fn values(&self) -> Vec<(Mux, i64)> {
+        self.gains.iter().map(|gain| (gain.object, gain.after)).collect()
     }
 }
 

@@ -15,6 +15,7 @@ use words::failure::{Failure, both};
 
 use crate::capture::Restorer;
 
+use super::bench::SWINGS;
 use super::{
     Bounds, Currents, Curves, Excursion, Found, Measurement, MoveRow, OutputLoad, Proposed, Reader, ResponseRow, Setup,
     Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of, speed_gains,
@@ -27,6 +28,12 @@ const ALIKE: f64 = 3e-3;
 /// Shortest and longest time between two samples: 1 ms and 4096 counts a turn show what there is to see, and a tenth of the rate is to
 /// be beyond a loop's bandwidth.
 const PERIODS: RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
+
+/// How often gains are made slower, and by how much.
+const SLOWER: usize = 12;
+const SLOWER_BY: f64 = 0.85;
+/// A gain that falls to one at more than this share of what was seen would fall there later, if more had been seen.
+const AT_ITS_END: f64 = 0.9;
 
 /// The ranges of what is asked for, with their units. Beyond these is what is mistyped, or not a number.
 const SPEED_RPM: RangeInclusive<f64> = 1.0..=100_000.0;
@@ -238,22 +245,24 @@ pub async fn find(
             (found, twin, off, response)
         }
     };
-    let proposed = Proposed::of(&found, &had, (model, loops), request.objective, request.with_position);
-    let proposed = proposed.map_err(|reason| match reason {
+    // On the twin a large current does no harm.
+    let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
+    let of = |most_hz| Proposed::of(&found, &had, (model, loops), (request.objective, most_hz), request.with_position);
+    let proposed = of(found.seen_hz()).map_err(|reason| match reason {
         Unreachable::Margins { .. } => {
             failed(&reason).next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load")
         }
         _ => failed(&reason),
     })?;
-    let after: Vec<(Mux, i64)> = proposed.gains.iter().map(|gain| (gain.object, gain.after)).collect();
-    // On the twin a large current does no harm.
-    let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
+    let most_a = SWINGS * request.bounds.current_a;
+    let (proposed, calmer) = calm(proposed, of, (&twin, wide, most_a)).await?;
+    let after = proposed.values();
     let trials = [twin.try_out(&[], wide).await?, twin.try_out(&after, wide).await?];
     let mut report = TuneReport {
         twin_off,
         peak_a: excursion.peak_a,
         travel_turns: excursion.travel_turns,
-        notes: notes(&found, &proposed, request),
+        notes: notes(&found, &proposed, request).into_iter().chain(calmer).collect(),
         ..rows(id.raw(), model, &found, &proposed, &trials)
     };
     report.response = response;
@@ -265,6 +274,30 @@ pub async fn find(
         report.twin_move = Some(moves);
     }
     Ok((report, proposed))
+}
+
+/// Gains with which the current of the twin does not swing by the encoder's counts where the shaft turns slowly: those that are proposed, or
+/// slower ones. And what is to be said of that.
+async fn calm(
+    mut proposed: Proposed,
+    of: impl Fn(f64) -> Result<Proposed, Unreachable>,
+    (twin, how, most_a): (&Twin, (Duration, Bounds), f64),
+) -> Result<(Proposed, Option<String>), Failure> {
+    let first_a = twin.slow_ripple_a(&proposed.values(), how).await?;
+    if first_a <= most_a {
+        return Ok((proposed, None));
+    }
+    let (most_a, first_hz) = (most_a.max(twin.slow_ripple_a(&[], how).await?), proposed.after.crossover_hz);
+    for _ in 0..SLOWER {
+        let Ok(next) = of(SLOWER_BY * proposed.after.crossover_hz) else { break };
+        proposed = next;
+        if twin.slow_ripple_a(&proposed.values(), how).await? <= most_a {
+            break;
+        }
+    }
+    let what =
+        "with gains that are faster the current of the twin swings at a slow speed, by the counts of its encoder";
+    Ok((proposed, Some(format!("{what}: by {first_a:.2} A with {first_hz:.0} Hz"))))
 }
 
 /// Currents that the drive shows.
@@ -405,6 +438,12 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
         notes.push(format!(
             "the bandwidth that was asked for is not reached: the margins end at {:.1} Hz",
             proposed.after.crossover_hz
+        ));
+    }
+    if proposed.after.crossover_hz > AT_ITS_END * found.seen_hz() {
+        let seen = found.seen_hz();
+        notes.push(format!(
+            "faster gains are not proposed: the shaft was seen to follow up to {seen:.0} Hz; a shorter --period shows more"
         ));
     }
     if request.torque_constant_nm_a.is_none() {

@@ -236,6 +236,19 @@ impl Twin {
         Ok(Trial { step, load })
     }
 
+    /// See [`Bench::slow_ripple_a`], with these values of its gains; 0 of a drive that does not show what its speed loop asks for.
+    ///
+    /// # Errors
+    /// What stopped it.
+    pub(super) async fn slow_ripple_a(&self, values: &[(Mux, i64)], how: (Duration, Bounds)) -> Result<f64, Failure> {
+        if self.loops.demand.is_none() {
+            return Ok(0.0);
+        }
+        let (mut world, drive) = self.booted(Fidelity::Full).await?;
+        let mut bench = self.run(&mut world, self.open(&drive, values, how)).await?;
+        self.run(&mut world, bench.slow_ripple_a()).await
+    }
+
     /// How it moves with these values of its gains, at half of this speed: the way takes three quarters of a second.
     ///
     /// # Errors

@@ -15,3 +15,4 @@ mod tune_joint;
 mod tune_named;
 mod tune_ramps;
 mod tune_random;
+mod tune_trial;

@@ -233,7 +233,7 @@ fn a_step_of_a_joint_gives_the_same_error_wherever_it_begins() {
             drive.disable().await.unwrap();
             host::tune::step((&drive, &restorer), &request(), 150.0, &mut Excursion::default()).await.unwrap()
         };
-        errors.push(sim::block_on(&mut world, run).unwrap().error());
+        errors.push(sim::block_on(&mut world, run).unwrap().0.error());
     }
     let (least, most) = errors.iter().fold((f64::MAX, 0.0_f64), |(least, most), it| (least.min(*it), most.max(*it)));
     assert!(most / least < 1.02, "{errors:?}");
