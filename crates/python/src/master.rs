@@ -24,8 +24,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use can::Tap;
+use canopen::object::DEVICE_TYPE;
 use canopen::{Mux, NmtCommand, NodeId};
 use host::capture::{WayBack, WaysBack};
 use host::network::read_machine;
@@ -49,6 +51,9 @@ use crate::failure::{bad_value, raised, wrong_use};
 use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
+
+/// How long is listened for a node before it is asked.
+const QUIET: Duration = Duration::from_secs(1);
 
 /// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.
 #[pyclass(frozen, module = "ferrodrive._native")]
@@ -172,12 +177,24 @@ impl Network {
         NodeId::all().filter(|id| self.core.facts(*id).seen_at.is_some()).map(|id| id.raw().into()).collect()
     }
 
-    /// Waits until a node has booted or was heard of.
+    /// Waits until a node has booted or was heard of. One that booted long ago, and has no heartbeat, says nothing by itself: it is asked.
     fn wait_for(&self, py: Python<'_>, node: u8, within_s: f64) -> PyResult<Job> {
-        let (node, patience) = (self.node(node)?, duration(within_s)?);
+        let (node, patience, network) = (self.node(node)?, duration(within_s)?, self.core.clone());
+        let now = move || network.with_core(|core| core.now());
+        let until = now() + patience;
         self.begin(py, async move {
-            let heard = node.wait(|view| view.facts.seen_at, patience).await;
-            Ok(Value::Bool(heard.is_ok()))
+            loop {
+                let quiet = (until - now()).min(QUIET);
+                if node.wait(|view| view.facts.seen_at, quiet).await.is_ok() {
+                    return Ok(Value::Bool(true));
+                }
+                let left = (until - now()).min(QUIET);
+                if left.is_zero() {
+                    return Ok(Value::Bool(false));
+                }
+                // It is heard of by any answer.
+                node.clone().with_timeout(left).upload(DEVICE_TYPE).await.ok();
+            }
         })
     }
 

@@ -218,3 +218,15 @@ def test_a_simulator_that_ends_is_an_error_not_a_hang(simulator):
                 network.upload(5, 0x1000)
     with pytest.raises(ferrodrive.SimulatorError):
         simulator.world("now")
+
+
+def test_a_drive_that_booted_long_ago_and_says_nothing_is_waited_for():
+    world = ferrodrive.World()
+    world.add("zlac8030l", node=4)
+    world.run_for(5)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(4, within=3)
+        assert world.now < 5 + 1.1
+        with pytest.raises(ferrodrive.NoAnswer):
+            network.wait_for(9, within=2.5)
+        assert 7.5 < world.now < 5 + 1.1 + 2.6

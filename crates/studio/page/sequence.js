@@ -3,19 +3,16 @@
 //
 // A step is `{ after_s, command }`: the time since the step before, and what was sent, which is about one node, or about those of its axes.
 
+import { HELD_ROWS, HELD_WHOLE, LEFT_OUT, baseOf, figure, heldNodes, isHeld, ms, withTimes } from "./sequence_held.js";
 import { SHAPES } from "./test_motion.js";
-
-/** `60 r/min` and the like as they are written: at most six significant digits, no exponent. */
-const figure = (value) => String(Number(Number(value).toPrecision(6)));
 
 /** `2008:00`, as files and command lines write `2008h:00`. */
 const objectOf = (object) => object.replace("h:", ":");
 /** A file of parameters (docs: `ferrodrive params`) with these values as they were typed. */
 const valuesFile = (values) => ["[values]", ...values.map(({ object, value }) => `"${objectOf(object)}" = ${JSON.stringify(value)}`)];
-const ms = (value) => `${figure(value)}ms`;
 /** The nodes that a command is about. */
-export const nodesOf = (command) => (isOfGroup(command) ? command.axes.map(({ node }) => node) : [command.node]);
-const isOfGroup = (command) => command.do === "group_move";
+export const nodesOf = (command) => (command.do === "group_move" ? command.axes.map(({ node }) => node) : heldNodes(command) ?? [command.node]);
+const isOfGroup = (command) => command.do === "group_move" || heldNodes(command) !== null;
 /** `1=90deg 2=-45deg` */
 const targets = (axes) => axes.map(({ node, degrees }) => `${node}=${figure(degrees)}deg`).join(" ");
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
@@ -82,9 +79,6 @@ function tuneOptions({ bandwidth_hz, phase_margin_deg, position, speed_rpm, curr
   ].filter((one) => one !== null);
 }
 
-/** Where a form has no word for a command, it has a line for people. */
-const LEFT_OUT = (what) => `# left out: ${what}`;
-
 /** Of what a PDO is to have, which the page sends as far as it changes: `TPDO1 = 6041:00,6064:00, event_ms 10`. */
 const shownPdo = ({ pdo, valid, objects, ...rest }) => `${pdo} ${[...(valid ? [] : ["off"]), ...(objects ? [objects.map(({ object }) => objectOf(object)).join()] : []), ...Object.entries(rest).map(([name, value]) => `${name} ${value}`)].join(", ") || "on"}`;
 
@@ -140,6 +134,7 @@ const ROWS = {
     cli: ({ axes, relative, rpm, rpm_per_s: ramp, within_s }) => `group move ${targets(axes)}${relative ? " --relative" : ""}${rpm ? ` --velocity ${figure(rpm)}rpm` : ""}${ramp ? ` --acceleration ${figure(ramp)}rpm/s` : ""}${within_s ? ` --within ${ms(within_s * 1e3)}` : ""}`,
     python: groupInPython,
   },
+  ...HELD_ROWS,
   write_pdos: {
     shown: ({ pdos }) => `Configure ${pdos.map(shownPdo).join("; ")}`,
     line: ({ node, pdos }) => pdos.map((one) => pdoLine(node, one)),
@@ -208,6 +203,7 @@ const WHOLE = {
   nmt: ({ command }) => typeof command === "string" && /^[a-z-]+$/.test(command),
   write_parameters: ({ values }) => Array.isArray(values) && values.length > 0 && values.every((one) => isObject(one?.object) && typeof one.value === "string" && !/[\n\r]/.test(one.value)),
   group_move: ({ axes }) => Array.isArray(axes) && axes.length > 1 && axes.every((axis) => Number.isInteger(axis?.node) && typeof axis.degrees === "number"),
+  ...HELD_WHOLE,
   write_pdos: ({ pdos }) => Array.isArray(pdos) && pdos.length > 0 && pdos.every(isPdo),
   capture: ({ quantities, trigger }) => isNames(quantities) && (trigger === null || typeof trigger === "string"),
   tune: (command) => typeof command.position === "boolean" && TUNE_FIGURES.every((name) => isFigure(command[name])) && TUNE_CHOICES.every((name) => command[name] === null || isFigure(command[name])),
@@ -229,31 +225,43 @@ const LEAVE_MOTION = ["enable", "reset_fault", "capture", "store", "nmt", "write
 
 /**
  * What is kept of commands that are sent: `take(command)` and `end()` give lists of commands. A jog is a turn that ends with a stop,
- * at the latest when the recording ends. Stop is a quick stop of each recorded node.
+ * at the latest when the recording ends, as a held motion of several drives has its own end. Stop is a quick stop of each recorded node.
  */
 export function recorder() {
   const [nodes, jogs] = [new Set(), new Set()];
+  /** The nodes of a held motion of several drives that has not ended. */
+  let held = null;
+  const endHeld = () => {
+    const was = held;
+    held = null;
+    return was === null ? [] : [{ do: "group_end" }];
+  };
   const end = () => {
     const open = [...jogs];
     jogs.clear();
-    return open.map((node) => ({ do: "stop", node }));
+    return [...open.map((node) => ({ do: "stop", node })), ...endHeld()];
   };
   function take(command) {
     const { do: word, node } = command;
-    const about = nodesOf(command);
     if (word === "stop_all") {
+      held = null;
       jogs.clear();
       return [...nodes].map((node) => ({ do: "quick_stop", node }));
     }
     if (word === "jog_end") return jogs.delete(node) ? [{ do: "stop", node }] : [];
+    if (word === "group_end") return endHeld();
     if (word !== "jog" && !isRecorded(command)) return [];
+    const about = nodesOf(command);
     for (const one of about) nodes.add(one);
+    // It has ended by itself, or this ends it.
+    const before = !LEAVE_MOTION.includes(word) && held?.some((one) => about.includes(one)) ? endHeld() : [];
     if (word === "jog") {
       jogs.add(node);
-      return [{ do: "velocity", node, rpm: command.rpm, rpm_per_s: null }];
+      return [...before, { do: "velocity", node, rpm: command.rpm, rpm_per_s: null }];
     }
     if (!LEAVE_MOTION.includes(word)) for (const one of about) jogs.delete(one);
-    return [{ ...command }];
+    if (isHeld(command)) held = about;
+    return [...before, { ...command }];
   }
   return { take, end };
 }
@@ -268,7 +276,7 @@ export const keptSteps = (steps) =>
   (Array.isArray(steps) ? steps : []).filter((step) => step && typeof step.after_s === "number" && step.command && isRecorded(step.command) && nodesOf(step.command).every(Number.isInteger));
 
 /** A line for people: `+1.50 s  node 4: Turn at 60 r/min`. */
-export const shownStep = ({ after_s, command }, at) => `${at > 0 ? `+${after_s.toFixed(2)} s ` : ""}${isOfGroup(command) ? "nodes" : "node"} ${nodesOf(command).join(", ")}: ${ROWS[command.do].shown(command)}`;
+export const shownStep = ({ after_s, command }, at) => `${at > 0 ? `+${after_s.toFixed(2)} s ` : ""}${nodesOf(command).length ? `${isOfGroup(command) ? "nodes" : "node"} ${nodesOf(command).join(", ")}: ` : ""}${ROWS[command.do].shown(command)}`;
 
 /** The models of the nodes that steps are about, as far as they have a name: an identity may fit several. */
 function modelsOf(steps, models) {
@@ -299,16 +307,20 @@ function withTrials(steps) {
   return said;
 }
 
+/** As programs say it: where one command is several of a page. */
+const asSaid = (steps) => withTimes(withTrials(steps));
+
 /** As commands of a shell; `bus` as the studio has it, `models` is the model of each node. */
 export function commandLine(steps, bus, models = []) {
-  const lines = withTrials(steps).flatMap((step, at) => {
+  const named = new Map(modelsOf(steps, models).map(({ node, model }) => [node, model]));
+  const lines = asSaid(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    const said = ROWS[step.command.do].cli(step.command);
+    const said = ROWS[step.command.do].cli(step.command, named);
     return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
   });
   // A virtual bus begins and ends with each command: there it has to be one that stays, served by ferrodrive sim.
   const export_ = bus === "sim" ? "export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim --serve socketcand://127.0.0.1:29536" : `export FERRODRIVE_BUS='${bus}'`;
-  const known = modelsOf(steps, models).map(({ node, model }) => ` --model ${node}=${model}`);
+  const known = [...named].map(([node, model]) => ` --model ${node}=${model}`);
   const own = known.length ? [`ferrodrive() { command ferrodrive${known.join("")} "$@"; }`] : [];
   return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ""].join("\n");
 }
@@ -317,7 +329,7 @@ export function commandLine(steps, bus, models = []) {
 export function python(steps, bus, models = []) {
   const known = new Map(modelsOf(steps, models).map(({ node, model }) => [node, JSON.stringify(model)]));
   const nodes = [...new Set(steps.flatMap(({ command }) => nodesOf(command)))];
-  const lines = withTrials(steps).flatMap((step, at) => {
+  const lines = asSaid(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     const said = ROWS[step.command.do].python(step.command, known);
     const own = Array.isArray(said) ? said : [`node_${step.command.node}.${said}`];
@@ -330,11 +342,15 @@ export function python(steps, bus, models = []) {
 /** As a scenario for `ferrodrive run`; `models` is the model of each node, of which all that are known are in its machine. */
 export function scenario(steps, models) {
   const drives = models.map(({ node, model }) => `    { model = "${model}", node = ${node} },`);
-  const lines = steps.flatMap((step, at) => {
+  const bases = [...new Set(steps.filter(({ command }) => command.do === "base_jog").map(({ command }) => baseOf(command)))];
+  const lines = withTimes(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
-    const said = [ROWS[step.command.do].line(step.command)].flat();
+    // Its machine has one base.
+    const { command } = step;
+    const isOther = command.do === "base_jog" && baseOf(command) !== bases[0];
+    const said = isOther ? [LEFT_OUT(`nodes ${nodesOf(command).join(", ")}: ${ROWS.base_jog.shown(command)}, as another base`)] : [ROWS[command.do].line(command)].flat();
     const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(isOfGroup(step.command) ? text : `${step.command.node} ${text}`)},`));
     return [...(pause === null ? [] : [`    "wait ${pause}s",`]), ...own];
   });
-  return ['title = "Recorded in the studio"', "", "[machine]", "drive = [", ...drives, "]", "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");
+  return ['title = "Recorded in the studio"', "", "[machine]", "drive = [", ...drives, "]", ...bases.slice(0, 1).map((base) => `base = { ${base} }`), "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");
 }

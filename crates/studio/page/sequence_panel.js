@@ -3,12 +3,14 @@
 import { ask, inControl, link, on, stopAll } from "./link.js";
 import { choice } from "./choice.js";
 import { h, setText, toggle } from "./dom.js";
+import { HOLD_MS } from "./motion_form.js";
 import { commandLine, isAwaited, keptSteps, nodesOf, python, recorder, scenario, shownStep } from "./sequence.js";
+import { isHeld } from "./sequence_held.js";
 import { keep, kept } from "./settings.js";
 
 const KEY = "sequence";
 const MOST = 200;
-const STOPS = ["stop", "quick_stop"];
+const STOPS = ["stop", "quick_stop", "group_end"];
 const FORMS = [
   { value: "line", text: "as command line", file: "sequence.sh" },
   { value: "python", text: "as Python", file: "sequence.py" },
@@ -25,7 +27,7 @@ export function sequencePanel(isAccepted) {
   const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
   const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
   const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
-  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, those of several drives together, homing, NMT, PDOs, parameters that are typed in their row and stored, captures, test motions, gains that are found and tried, and values that are put back. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not; what follows gains that are found waits for them.");
+  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, those of several drives together, also held ones, homing, NMT, PDOs, parameters that are typed in their row and stored, captures, test motions, gains that are found and tried, and values that are put back. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not; what follows gains that are found waits for them.");
   const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
   let steps = keptSteps(kept(KEY, []));
   /** What records; null while nothing is recorded. */
@@ -34,6 +36,8 @@ export function sequencePanel(isAccepted) {
   let before = 0;
   /** The play under way, a new object each time: the nodes that it has commanded. */
   let playing = null;
+  /** What holds a motion of several drives that is played. */
+  let holding = 0;
 
   function change(to) {
     steps = to;
@@ -77,6 +81,7 @@ export function sequencePanel(isAccepted) {
   function halt(why, stops = true) {
     if (!playing) return;
     const { nodes } = playing;
+    clearInterval(holding);
     playing = null;
     play.checked = false;
     setText(status, why);
@@ -121,6 +126,8 @@ export function sequencePanel(isAccepted) {
       if (playing !== mine) return;
       setText(status, `${at + 1} of ${steps.length}: ${shownStep(steps[at], 0)}`);
       for (const node of nodesOf(command)) mine.nodes.add(node);
+      if (isHeld(command) || command.do === "group_end") clearInterval(holding);
+      if (isHeld(command)) holding = setInterval(() => ask({ do: "group_hold" }), HOLD_MS);
       // The next command comes when it came, and replaces a motion that is not done; one that needs what this finds waits for it.
       const answered = ask(command).then((answer) => {
         // The Scope view keeps what was captured.

@@ -219,3 +219,41 @@ test("a trial without its tuning is named, and a tuning without limits is not ke
   assert.match(commandLine(tuned.slice(1, 2), "can0"), /^# left out: node 4: gains that were found before/m);
   for (const name of ["current_a", "travel_turns", "period_ms"]) assert.deepEqual(keptSteps([{ after_s: 0, command: { ...tune, [name]: null } }]), [], name);
 });
+
+const base = { do: "base_jog", wheels: [4, 5], turns: [1, -1], wheel_base_m: 0.4, wheel_radius_m: 0.084, most_m_s: 0.3, m_per_s2: 0.5, linear_m_s: 0.1, angular_rad_s: 0.25 };
+const turning = { do: "group_jog", axes: [{ node: 1, rpm: 30 }, { node: 2, rpm: -15 }], rpm_per_s: null };
+const held = [
+  { after_s: 0, command: base },
+  { after_s: 1.5, command: { do: "group_end" } },
+  { after_s: 2, command: turning },
+  { after_s: 0.7, command: { do: "group_end" } },
+];
+
+test("a held motion of several drives is recorded from its begin to its end, however it ends", () => {
+  const { take, end } = recorder();
+  assert.deepEqual(take({ do: "group_end" }), [], "nothing was held");
+  assert.deepEqual([base, { do: "base_twist" }, { do: "group_hold" }, { do: "group_end" }].flatMap(take), [base, { do: "group_end" }]);
+  take(turning);
+  assert.deepEqual(take({ do: "enable", node: 4 }), [{ do: "enable", node: 4 }], "another drive");
+  assert.deepEqual(take({ do: "move", node: 2, degrees: 5, relative: true, rpm: null })[0], { do: "group_end" }, "one of its drives gets another command");
+  take(turning);
+  assert.deepEqual(take({ do: "stop_all" }).map(({ do: word }) => word), ["quick_stop", "quick_stop", "quick_stop", "quick_stop"]);
+  assert.deepEqual(end(), []);
+  take(turning);
+  assert.deepEqual(end(), [{ do: "group_end" }], "the recording ends");
+});
+
+test("a held base has its time in each form, with the machine that it takes", () => {
+  assert.deepEqual(keptSteps([...held, { after_s: 0, command: { ...base, wheels: [4] } }]), held);
+  assert.equal(shownStep(held[0], 0), "nodes 4, 5: Drive the base at 0.1 m/s and 0.25 rad/s");
+  assert.equal(shownStep(held[1], 1), "+1.50 s End of the held motion");
+  const models = [4, 5].map((node) => ({ node, model: "zlac8030l" }));
+  const shell = commandLine(held, "can0", models);
+  for (const line of ["wheels = [4, 5]", "turns = [1, -1]", "wheel_m_s = 0.3", "angular_rad_s = 1.5", "ferrodrive drive-base base.toml --linear 0.1 --angular 0.25 --for 1500ms", "sleep 2", "# left out: nodes 1, 2: Turn together at 30, -15 r/min for 0.7 s"]) assert.ok(shell.includes(`${line}\n`), line);
+  assert.match(commandLine(held, "can0"), /^# left out: nodes 4, 5: .*the models of its wheels are not known$/m);
+  const program = python(held, "can0", models);
+  for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)"]) assert.ok(program.includes(`${line}\n`), line);
+  const run = scenario([...held, { after_s: 1, command: { ...base, wheels: [5, 4] } }], models);
+  for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
+  assert.match(run, /^ {4}# left out: nodes 5, 4: .*as another base$/m);
+});

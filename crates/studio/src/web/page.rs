@@ -68,6 +68,7 @@ const SOURCES: &[(&str, &str)] = files![
     "settings.js",
     "kept.js",
     "sequence.js",
+    "sequence_held.js",
     "sequence_panel.js",
     "series.js",
     "analysis.js",

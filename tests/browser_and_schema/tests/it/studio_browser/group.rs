@@ -58,18 +58,33 @@ async fn two_drives_move_together_turn_while_held_and_stop_together() {
         let moved = angles(state).into_iter().zip(&before).all(|(now, before)| now - before > 45.0);
         moved && all(state, |node| speed(node) < 2.0)
     });
-    let button = stage.find("#group-forward").await;
-    let down = MouseActions::new("mouse".into())
-        .then(PointerAction::MoveToElement { element: button, duration: None, x: 0.0, y: 0.0 })
-        .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
+    let hold = async || {
+        // What was recorded is drawn above it, and the header lies on what is scrolled away.
+        stage.script("document.getElementById('group-forward').scrollIntoView({ block: 'center' })").await;
+        let element = stage.find("#group-forward").await;
+        let down = MouseActions::new("mouse".into())
+            .then(PointerAction::MoveToElement { element, duration: None, x: 0.0, y: 0.0 })
+            .then(PointerAction::Down { button: MOUSE_BUTTON_LEFT });
+        stage.client.perform_actions(down).await.expect("a press");
+    };
     let turn = |state: &Value| all(state, |node| speed(node) > 20.0);
-    stage.press_until(turn, async || stage.client.perform_actions(down.clone()).await.expect("a press")).await;
+    let rest = |state: &Value| all(state, |node| speed(node) < 2.0);
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=true]").await;
+    stage.press_until(turn, hold).await;
     stage.client.release_actions().await.expect("a release");
-    stage.studio.wait("both rest", |state| all(state, |node| speed(node) < 2.0));
+    stage.studio.wait("both rest", rest);
     stage.says("#group-notice", "at rest, power stage off").await;
-    stage.press_until(turn, async || stage.client.perform_actions(down.clone()).await.expect("a press")).await;
+    stage.click_for("#sequence-record", "#sequence-record[aria-pressed=false]").await;
+    // Played, it is held by the page for as long as the button was, to which belongs the time until both had power.
+    stage.says(".sequence li:nth-last-child(2)", "nodes 2, 4: Turn together at 30, 30 r/min").await;
+    stage.says(".sequence li:last-child", "End of the held motion").await;
+    let play = "const play = document.getElementById('sequence-play'); if (!play.checked) play.click()";
+    let begun = |state: &Value| all(state, |node| speed(node) > 5.0);
+    stage.press_until(begun, async || drop(stage.script(play).await)).await;
+    stage.studio.wait("both rest", rest);
+    stage.press_until(turn, hold).await;
     stage.client.perform_actions(press(Key::Escape.into())).await.expect("a press");
-    stage.studio.wait("both rest", |state| all(state, |node| speed(node) < 2.0));
+    stage.studio.wait("both rest", rest);
     stage.says("#group-notice", "stop").await;
     stage.client.release_actions().await.expect("a release");
     stage.click("#theme").await;
