@@ -187,7 +187,8 @@ fn averaged(samples: &Samples) -> Result<Response, Unusable> {
     let mut spectra = Spectra::new(samples, len, hann);
     starts.iter().for_each(|start| spectra.add(*start));
     // What the window spreads over its neighbours says nothing of its own.
-    Ok(spectra.response(3..len / 2 - 1, starts.len()))
+    // And beyond a quarter of the rate most is what happened between two samples.
+    Ok(spectra.response(3..len / 4, starts.len()))
 }
 
 /// By how much a position that follows a current twice integrated is less than it would be if the current did not stand

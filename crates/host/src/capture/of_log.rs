@@ -15,10 +15,21 @@ use super::quantity::Quantity;
 /// Readings of a log that are kept at most.
 const MOST: usize = 50_000_000;
 
+/// Of the cycles of SYNC between its first value and its last, a PDO that is sent by SYNC has come in as many at least.
+const IN_CYCLES: f64 = 0.9;
+
 /// An object of a node as one direction of its PDOs has it: a demand that is sent to it and the same one sent back are two quantities.
 type Key = (u8, Mux, bool);
 
-/// The record of a log, with times from its first frame on.
+/// A series, and for each of its points how many SYNCs came before.
+struct LoggedObject {
+    quantity: Quantity,
+    series: Series,
+    syncs_before: Vec<usize>,
+}
+
+/// The record of a log, with times from its first frame on. What comes once in each cycle of SYNC has the time of its SYNC, at which it was
+/// sampled (CiA 301, 7.2.2.3); all else that of its frame.
 ///
 /// # Errors
 /// In a sentence: no frame is a PDO whose mapping is known, with what to do about it; there are too many readings.
@@ -26,11 +37,19 @@ pub fn record_of_log(
     mut decoder: Decoder,
     frames: impl IntoIterator<Item = (Instant, Frame)>,
 ) -> Result<Recorded, String> {
-    let mut found: BTreeMap<Key, Option<(Quantity, Series)>> = BTreeMap::new();
+    let mut found: BTreeMap<Key, Option<LoggedObject>> = BTreeMap::new();
     let (mut first, mut count, mut unmapped) = (None, 0_usize, 0_usize);
+    let mut syncs_s = Vec::new();
     for (at, frame) in frames {
         let at_s = (at - *first.get_or_insert(at)).as_secs_f64();
-        let Decoded::Pdo(pdo) = decoder.decode(&frame) else { continue };
+        let pdo = match decoder.decode(&frame) {
+            Decoded::Pdo(pdo) => pdo,
+            Decoded::Sync { .. } => {
+                syncs_s.push(at_s);
+                continue;
+            }
+            _ => continue,
+        };
         unmapped += usize::from(pdo.mapped_bytes.is_none());
         let is_sent = pdo.pdo.direction == Direction::Tpdo;
         let Some(node) = pdo.object_node() else { continue };
@@ -39,17 +58,18 @@ pub fn record_of_log(
                 Entry::Occupied(kept) => kept.into_mut(),
                 Entry::Vacant(place) => place.insert(series(pdo.model(), node, record.mux, is_sent)),
             };
-            let Some((quantity, series)) = kept else { continue };
+            let Some(kept) = kept else { continue };
             count += 1;
             if count > MOST {
                 return Err(format!(
                     "more than {MOST} readings are in it: cut it, for instance with ferrodrive convert"
                 ));
             }
-            series.points.push((at_s, quantity.by_pdo.value(*raw as u32)));
+            kept.series.points.push((at_s, kept.quantity.by_pdo.value(*raw as u32)));
+            kept.syncs_before.push(syncs_s.len());
         }
     }
-    let series: Vec<Series> = found.into_values().flatten().map(|(_, series)| series).collect();
+    let series: Vec<Series> = found.into_values().flatten().map(|found| found.by_sync(&syncs_s)).collect();
     if series.is_empty() {
         return Err(if unmapped == 0 {
             "no frame in it is a PDO".to_owned()
@@ -62,13 +82,22 @@ pub fn record_of_log(
     Ok(Recorded { series, marks: Vec::new(), torn: false })
 }
 
+impl LoggedObject {
+    /// Its series, by the times of SYNC where it comes in their cycles.
+    fn by_sync(mut self, syncs_s: &[f64]) -> Series {
+        let [first, .., last] = self.syncs_before[..] else { return self.series };
+        let is_once = self.syncs_before.windows(2).all(|pair| pair[0] < pair[1]);
+        if first > 0 && is_once && self.syncs_before.len() as f64 >= IN_CYCLES * (last - first + 1) as f64 {
+            for (point, before) in self.series.points.iter_mut().zip(self.syncs_before) {
+                point.0 = syncs_s[before - 1];
+            }
+        }
+        self.series
+    }
+}
+
 /// `None` for what is not a number of at most 32 bits.
-fn series(
-    model: Option<&'static devices::Description>,
-    node: NodeId,
-    mux: Mux,
-    is_sent: bool,
-) -> Option<(Quantity, Series)> {
+fn series(model: Option<&'static devices::Description>, node: NodeId, mux: Mux, is_sent: bool) -> Option<LoggedObject> {
     let row = model.map_or_else(|| common_row(mux), |model| model.row(mux));
     if row.is_some_and(|row| !row.data_type.fits_cell()) {
         return None;
@@ -77,7 +106,7 @@ fn series(
     let signal = if is_sent { quantity.name.clone() } else { format!("sent_{}", quantity.name) };
     let subject = Subject::Axis(Place::node(node.raw()));
     let column = Column { subject, signal: signal.into(), unit: quantity.unit.clone().into() };
-    Some((quantity, Series { column, points: Vec::new() }))
+    Some(LoggedObject { quantity, series: Series { column, points: Vec::new() }, syncs_before: Vec::new() })
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ pub use curves::{Curves, GainAndPhase, ResponseRow};
 pub use found::Found;
 pub use measure::measure;
 pub use moves::MoveRow;
-pub use of_capture::{CaptureReport, of_capture};
+pub use of_capture::{CaptureReport, delivered_counts, of_capture};
 pub use order::{LoadOrder, Order};
 pub(crate) use outcome::{TuneOutcome, Tuned};
 pub use proposed::{Gain, Proposed, Unreachable};

@@ -4,7 +4,9 @@
 
 use std::f64::consts::TAU;
 
+use canopen::od::DefaultValue;
 use cia402::RAD_S_PER_RPM;
+use devices::{CountsPerTurn, Description};
 use plot::{Figure, Poster};
 use recording::{Capture, Trace};
 use serde::Serialize;
@@ -13,16 +15,22 @@ use words::failure::Failure;
 
 use super::ResponseRow;
 
-/// Signals by the names of their quantities, the best first, each with how many rad, rad/s or A its unit is.
-const SET_POINTS: [(&str, f64); 4] = [
-    ("velocity_demand_rpm", RAD_S_PER_RPM),
-    ("target_velocity_rpm", RAD_S_PER_RPM),
-    ("sent_target_velocity_rpm", RAD_S_PER_RPM),
-    ("set_point_rpm", RAD_S_PER_RPM),
+/// Signals by the names of their quantities without their units, the best first: those of captures, and those of objects in a log of frames.
+const SET_POINTS: [&str; 5] =
+    ["velocity_demand", "velocity_demand_value", "target_velocity", "sent_target_velocity", "set_point"];
+const CURRENTS: [&str; 6] = [
+    "current_demand",
+    "torque_demand",
+    "torque_demand_value",
+    "current",
+    "current_actual_value",
+    "torque_actual_value",
 ];
-const CURRENTS: [(&str, f64); 2] = [("current_demand_a", 1.0), ("current_a", 1.0)];
-const POSITIONS: [(&str, f64); 1] = [("position_deg", TAU / 360.0)];
-const SPEEDS: [(&str, f64); 1] = [("velocity_rpm", RAD_S_PER_RPM)];
+const POSITIONS: [&str; 2] = ["position", "position_actual_value"];
+const SPEEDS: [&str; 2] = ["velocity", "velocity_actual_value"];
+
+/// How the name of a position ends that is not in degrees.
+const COUNTS: &str = "_counts";
 
 /// Times between two rows that are as much longer than the others are gaps; and as much shorter than that they are all equal.
 const GAP: f64 = 1.5;
@@ -72,16 +80,37 @@ pub struct CaptureReport {
     pub picture: Poster,
 }
 
-/// What a capture shows of its drive; `torque_constant_nm_a` is the torque per ampere of its motor.
+/// Counts in a turn of a model's shaft as it is delivered; `None` where that depends on how it is set up.
+pub fn delivered_counts(model: &Description) -> Option<f64> {
+    match model.axes.first()?.units.counts_per_turn {
+        CountsPerTurn::Fixed(counts) => Some(f64::from(counts)),
+        CountsPerTurn::Object { object, factor } => match model.row(object)?.default {
+            DefaultValue::Value(value) => Some(value as f64 * f64::from(factor)),
+            _ => None,
+        },
+        CountsPerTurn::Table { counts, default, .. } => counts.get(default as usize).map(|counts| f64::from(*counts)),
+        CountsPerTurn::Ratio { .. } => None,
+    }
+}
+
+/// What a capture shows of its drive; `torque_constant_nm_a` is the torque per ampere of its motor, `counts_per_turn` what a turn of its
+/// shaft has, where the capture counts.
 ///
 /// # Errors
 /// What it lacks, that its rows are not evenly spaced, and why nothing can be said of them.
-pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Result<CaptureReport, Failure> {
+pub fn of_capture(
+    capture: &Capture,
+    torque_constant_nm_a: Option<f64>,
+    counts_per_turn: Option<f64>,
+) -> Result<CaptureReport, Failure> {
     let failed = |reason: &dyn std::fmt::Display| {
         Failure::new(format!("nothing can be found from the capture of node {}", capture.place)).because(reason)
     };
-    let signals = UsedTraces::of(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
+    let signals = UsedTraces::of(capture, counts_per_turn).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
     let (samples, mut notes) = signals.samples(capture).map_err(|reason| failed(&reason).of_kind("bad_file"))?;
+    if let Some(counts) = counts_per_turn.filter(|_| signals.motion.0.quantity.ends_with(COUNTS)) {
+        notes.push(format!("a turn is taken to have {counts} counts, as the model is delivered"));
+    }
     if capture.is_cut_off {
         notes.push("the end of the file is missing: what is there was used".to_owned());
     }
@@ -120,6 +149,18 @@ pub fn of_capture(capture: &Capture, torque_constant_nm_a: Option<f64>) -> Resul
     })
 }
 
+/// How many rad, rad/s or A the unit of a trace is, by how its name ends after that of its quantity.
+fn worth(trace: &Trace, ending: &str, counts_per_turn: Option<f64>) -> Option<f64> {
+    match (ending, trace.unit.as_str()) {
+        ("_deg", _) => Some(TAU / 360.0),
+        ("_rpm", _) => Some(RAD_S_PER_RPM),
+        ("_a" | "_rad", _) => Some(1.0),
+        ("", "mA") => Some(1e-3),
+        (COUNTS, _) => counts_per_turn.map(|counts| TAU / counts),
+        _ => None,
+    }
+}
+
 /// The traces that are used, each with what its unit is worth.
 struct UsedTraces<'a> {
     current: (&'a Trace, f64),
@@ -129,20 +170,23 @@ struct UsedTraces<'a> {
 }
 
 impl<'a> UsedTraces<'a> {
-    fn of(capture: &'a Capture) -> Result<Self, String> {
-        let find = |names: &[(&str, f64)]| {
-            names.iter().find_map(|(name, worth)| {
-                let trace = capture.traces.iter().find(|trace| trace.quantity == *name)?;
-                Some((trace, *worth))
-            })
+    fn of(capture: &'a Capture, counts_per_turn: Option<f64>) -> Result<Self, String> {
+        let find = |names: &[&str]| {
+            let used = |name: &&str| {
+                let of = |trace: &'a Trace| {
+                    Some((trace, worth(trace, trace.quantity.strip_prefix(*name)?, counts_per_turn)?))
+                };
+                capture.traces.iter().find_map(of)
+            };
+            names.iter().find_map(used)
         };
         let had = || capture.traces.iter().map(|trace| trace.quantity.as_str()).collect::<Vec<_>>().join(", ");
         let lacks = |what: &str| {
             format!("it has no {what}, only {}: ferrodrive capture NODE velocity_demand current_demand position", had())
         };
-        let current = find(&CURRENTS).ok_or_else(|| lacks("current_demand_a and no current_a"))?;
+        let current = find(&CURRENTS).ok_or_else(|| lacks("current in A: current_demand_a or current_a"))?;
         let angle = find(&POSITIONS);
-        let motion = angle.or_else(|| find(&SPEEDS)).ok_or_else(|| lacks("position_deg and no velocity_rpm"))?;
+        let motion = angle.or_else(|| find(&SPEEDS)).ok_or_else(|| lacks("motion: position_deg or velocity_rpm"))?;
         Ok(Self { current, motion, is_angle: angle.is_some(), set_point: find(&SET_POINTS) })
     }
 

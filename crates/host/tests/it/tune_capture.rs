@@ -4,38 +4,46 @@ use std::io::Cursor;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use host::capture::Restorer;
-use host::tune::{Bounds, Excursion, Setup, Twin, loops_of, measure, motor_of, of_capture};
+use can::{Frame, Instant, Station};
+use host::capture::{Restorer, record_of_log};
+use host::tune::{Bounds, Excursion, Setup, Twin, delivered_counts, loops_of, measure, motor_of, of_capture};
+use master::Drive;
 use master::cyclic::CyclicOptions;
+use master::decode::Decoder;
 use recording::{Capture, Kind, Trace};
-use sim::Place;
+use sim::{Place, World};
+use tune::Samples;
 
 use crate::tune::with_constant;
 
 const LOAD_KG_M2: f64 = 0.03;
 
-/// What a wheel with a load shows while it is excited, as any instrument would have recorded it.
-fn captured() -> Capture {
+/// A wheel with a load.
+fn plant() -> Twin {
     let model = devices::model("zlac8030l").unwrap();
     let (motor, loops) = (motor_of(model).unwrap(), model.axes[0].loops.as_ref().unwrap());
     let words = vec![format!("load inertia {LOAD_KG_M2}"), "load friction 0.2 viscous 0.01".to_owned()];
-    let plant = Twin::with_load((model, loops), words, with_constant(&motor));
-    let (mut world, drive) = plant.world().unwrap();
+    Twin::with_load((model, loops), words, with_constant(&motor))
+}
+
+/// Samples of it while it is excited.
+fn measured(world: &mut World, drive: &Drive, period: Duration) -> Samples {
     let run = async {
-        let (model, loops) = loops_of(&drive).unwrap();
-        let setup = Setup::begin(
-            (&drive, &Restorer::of(&drive)),
-            (model, loops),
-            &host::tune::speed_gains(loops),
-            None,
-            |_| (),
-        )
-        .await
-        .unwrap();
-        let how = (Duration::from_millis(1), Bounds::default(), CyclicOptions::default());
-        measure(&drive, &setup, loops, how, &mut Excursion::default()).await.unwrap().samples
+        let (model, loops) = loops_of(drive).unwrap();
+        let setup =
+            Setup::begin((drive, &Restorer::of(drive)), (model, loops), &host::tune::speed_gains(loops), None, |_| ())
+                .await
+                .unwrap();
+        let how = (period, Bounds::default(), CyclicOptions::default());
+        measure(drive, &setup, loops, how, &mut Excursion::default()).await.unwrap().samples
     };
-    let samples = sim::block_on(&mut world, run).unwrap();
+    sim::block_on(world, run).unwrap()
+}
+
+/// The same, as any instrument would have recorded it.
+fn captured() -> Capture {
+    let (mut world, drive) = plant().world().unwrap();
+    let samples = measured(&mut world, &drive, Duration::from_millis(1));
     let time_s: Vec<f64> = (0..samples.len()).map(|n| n as f64 * samples.period_s).collect();
     let trace = |name: &str, unit: &str, values: &[f64], worth: f64| {
         Trace::new(name.into(), unit.into(), values.iter().map(|value| value / worth).collect(), &time_s)
@@ -94,7 +102,7 @@ fn a_capture_in_a_file_shows_the_inertia_and_the_speed_loop_of_its_drive() {
     let truth = motor.rotor.inertia_kg_m2 + LOAD_KG_M2;
     let capture = captured();
     for kind in [Kind::Csv, Kind::Mcap] {
-        let report = of_capture(&through(&capture, kind), Some(constant)).unwrap();
+        let report = of_capture(&through(&capture, kind), Some(constant), None).unwrap();
         let inertia = report.inertia_kg_m2.unwrap();
         assert!((inertia / truth - 1.0).abs() < 0.05, "{inertia} kg m², the plant has {truth}: {report:?}");
         assert!(report.coherent >= 12 && report.model_off < 0.2 && report.resonance_hz.is_none(), "{report:?}");
@@ -109,10 +117,56 @@ fn a_capture_in_a_file_shows_the_inertia_and_the_speed_loop_of_its_drive() {
         .map(|n| (angle[(n + 1).min(angle.len() - 1)] - angle[n.saturating_sub(1)]) / 2e-3 / 6.0)
         .collect();
     other.traces[1] = Trace::new("velocity_rpm".into(), "r/min".into(), rpm, &other.time_s);
-    let report = of_capture(&other, Some(constant)).unwrap();
+    let report = of_capture(&other, Some(constant), None).unwrap();
     let inertia = report.inertia_kg_m2.unwrap();
     assert!((inertia / truth - 1.0).abs() < 0.1, "{inertia} kg m², the plant has {truth}: {report:?}");
     assert!(report.notes.iter().any(|note| note.contains("velocity_demand")) && report.proportional_a_s_rad.is_none());
+}
+
+/// All that is on a bus.
+#[derive(Clone, Default)]
+struct Log(Arc<Mutex<Vec<(Instant, Frame)>>>);
+
+impl Station for Log {
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        self.0.lock().unwrap().push((now, *frame));
+    }
+    fn handle_timeout(&mut self, _: Instant) {}
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        None
+    }
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// By its PDOs: current and position from TPDOs, the set-point from the RPDO of the program that moved it. In mA and counts, at the times of SYNC.
+#[test]
+fn a_log_of_frames_shows_the_inertia_and_the_speed_loop_too() {
+    let (mut world, drive) = plant().world().unwrap();
+    let log = Log::default();
+    world.add_station(log.clone());
+    measured(&mut world, &drive, Duration::from_millis(5));
+    let model = devices::model("zlac8030l").unwrap();
+    let mut decoder = Decoder::new();
+    decoder.set_model(drive.node().id(), model);
+    let frames = std::mem::take(&mut *log.0.lock().unwrap());
+    let capture = Capture::of(&record_of_log(decoder, frames).unwrap(), None).unwrap();
+    let motor = motor_of(model).unwrap();
+    let constant = motor.windings.torque_constant_nm_a();
+    let report = of_capture(&capture, Some(constant), delivered_counts(model)).unwrap();
+    assert_eq!(report.quantities, ["torque_demand", "position_actual_value_counts", "sent_target_velocity_rpm"]);
+    let inertia = report.inertia_kg_m2.unwrap();
+    let truth = motor.rotor.inertia_kg_m2 + LOAD_KG_M2;
+    assert!((inertia / truth - 1.0).abs() < 0.1 && report.resonance_hz.is_none(), "{inertia}, the plant has {truth}");
+    // 0.5e-3 A/(r/min) for a count of its gain, of which it has 500; the time constant of its filter is not in a log.
+    let proportional = report.proportional_a_s_rad.unwrap() * cia402::RAD_S_PER_RPM;
+    assert!((proportional / 0.25 - 1.0).abs() < 0.25, "{proportional}");
+    assert!(
+        report.notes.iter().any(|note| note.contains("4096 counts, as the model is delivered")),
+        "{:?}",
+        report.notes
+    );
 }
 
 #[test]
@@ -121,14 +175,14 @@ fn what_a_capture_lacks_is_said_with_what_would_do() {
     let says = |change: fn(&mut Capture), text: &str| {
         let mut changed = capture.clone();
         change(&mut changed);
-        let failure = of_capture(&changed, None).unwrap_err();
+        let failure = of_capture(&changed, None, None).unwrap_err();
         assert!(failure.to_string().contains(text), "{failure}");
     };
     says(
         |it| drop(it.traces.remove(0)),
-        "it has no current_demand_a and no current_a, only position_deg, velocity_demand_rpm",
+        "it has no current in A: current_demand_a or current_a, only position_deg, velocity_demand_rpm",
     );
-    says(|it| drop(it.traces.remove(1)), "it has no position_deg and no velocity_rpm");
+    says(|it| drop(it.traces.remove(1)), "it has no motion: position_deg or velocity_rpm");
     says(|it| it.traces[0].values.fill(f64::NAN), "no three rows have all of");
     says(|it| it.time_s.iter_mut().step_by(2).for_each(|at| *at += 0.3e-3), "not evenly spaced: ");
     says(|it| it.traces[1].values.fill(7.0), "the position does not change");
@@ -143,7 +197,7 @@ fn what_a_capture_lacks_is_said_with_what_would_do() {
     let mut gap = capture.clone();
     let at = gap.time_s.len() / 10;
     gap.traces.iter_mut().for_each(|trace| trace.values[at] = f64::NAN);
-    let report = of_capture(&gap, None).unwrap();
+    let report = of_capture(&gap, None, None).unwrap();
     assert_eq!(report.rows, capture.time_s.len() - at - 1);
     assert!(report.notes.iter().any(|note| note.contains("the longest stretch without a gap")), "{report:?}");
     assert!(report.inertia_kg_m2.is_none() && report.notes.iter().any(|note| note.contains("--torque-constant")));

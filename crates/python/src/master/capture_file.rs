@@ -65,7 +65,7 @@ pub(crate) fn tune_capture(
     node: Option<u8>,
     torque_constant: Option<f64>,
 ) -> PyResult<Py<PyAny>> {
-    let found = py.detach(|| of_capture(&loaded(&path, node)?, torque_constant));
+    let found = py.detach(|| of_capture(&loaded(&path, node)?, torque_constant, None));
     Value::report(&found.map_err(|failure| raised(py, &failure))?).into_python(py)
 }
 

@@ -88,7 +88,8 @@ pub(crate) struct Tune {
     /// Identify the drive from a recorded run; nothing moves
     ///
     /// Of `capture`, `test-motion` or another instrument, NAME.mcap or NAME.csv: frequency response with coherence, masses and speed
-    /// loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or velocity_rpm. No gains are proposed.
+    /// loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or velocity_rpm. Or a log of frames (candump, BLF, ..)
+    /// whose PDOs have set-point, current and motion, with --model or --machine. No gains are proposed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["apply", "bandwidth"])]
     capture: Option<PathBuf>,
     /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
@@ -256,9 +257,11 @@ impl Tune {
                 .because(reason)
         };
         let recorded = read_record(path, context.decoder())?;
-        let known = context.models.get(&self.node).map(|stated| stated.description().name);
+        let model = context.models.get(&self.node).map(|stated| stated.description());
+        let known = model.map(|model| model.name);
         let capture = Capture::of(&recorded, Some(Place::node(self.node.raw()))).map_err(unread)?;
-        let mut report = host::tune::of_capture(&capture, self.torque_constant)?;
+        let mut report =
+            host::tune::of_capture(&capture, self.torque_constant, model.and_then(host::tune::delivered_counts))?;
         if let Some(model) = known.filter(|model| !capture.model.is_empty() && capture.model != *model) {
             report.notes.push(format!("it was captured of a {}, and node {} is a {model}", capture.model, self.node));
         }
