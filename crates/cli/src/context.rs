@@ -138,6 +138,16 @@ impl Shell for Terminal {
 }
 
 impl Context {
+    /// The models that were named, for a file that is not of this bus: those of the embedded bus only where a machine file describes it.
+    pub(crate) fn named_models(&self) -> impl Iterator<Item = (NodeId, &'static Description)> {
+        let is_described = !matches!(self.bus, BusSpec::Sim { file: None });
+        let is_named = move |stated: &Stated| is_described || matches!(stated, Stated::ByUser(_));
+        self.models
+            .iter()
+            .filter(move |(_, stated)| is_named(stated))
+            .map(|(node, stated)| (*node, stated.description()))
+    }
+
     /// A context for `network`. `embedded` are the drives of an embedded bus, which need no machine file; --model overrules
     /// both.
     pub(crate) fn new(

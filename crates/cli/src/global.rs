@@ -128,17 +128,20 @@ impl Global {
     /// The command line with a machine file that a command names itself, as if it stood behind `--machine`.
     ///
     /// # Errors
-    /// Where `--machine` names another one.
+    /// Where `--machine` or a virtual bus names another one.
     pub(crate) fn on_machine(&self, path: &Path, machine: &Machine) -> Result<Self, Failure> {
         self.refuse_another(path)?;
         let mut global = self.clone();
         let before = self.machine_file.as_ref();
         let of_machine =
             |file: &Option<PathBuf>| file.as_deref().is_none_or(|file| before.is_some_and(|own| own.path == file));
-        if matches!(&global.bus, BusSpec::Sim { file } if of_machine(file)) {
-            global.bus = BusSpec::Sim { file: Some(path.to_owned()) };
-        } else {
-            global.machine = Some(machine.clone());
+        match &global.bus {
+            BusSpec::Sim { file } if of_machine(file) => global.bus = BusSpec::Sim { file: Some(path.to_owned()) },
+            // The drives of a virtual bus are those of its file.
+            BusSpec::Sim { file: Some(other) } if !is_same_file(other, path) => {
+                return Err(two_files(path, other).next(format!("or --bus sim:{} alone", path.display())));
+            }
+            _ => global.machine = Some(machine.clone()),
         }
         Ok(global)
     }
@@ -150,6 +153,10 @@ impl Global {
             _ => Ok(()),
         }
     }
+}
+
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    one == other || one.canonicalize().ok().zip(other.canonicalize().ok()).is_some_and(|(one, other)| one == other)
 }
 
 pub(crate) fn two_files(one: &Path, other: &Path) -> Failure {

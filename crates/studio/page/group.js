@@ -18,15 +18,15 @@ function holder(report) {
     const mine = { timer: setInterval(() => renewed(mine, hold), HOLD_MS) };
     held = mine;
     const answer = await ask(command);
-    // The answer comes at the end.
+    // The answer comes at the end. A recorded motion ends with it, also where the studio has ended it.
     report(name, answer);
-    if (held === mine) drop();
+    if (held === mine) end();
   }
 
   async function renewed(mine, hold) {
     const answer = await ask(hold());
     // Stopped, or held again too late: it does not restart by itself.
-    if (!answer.ok && held === mine) drop();
+    if (!answer.ok && held === mine) end();
   }
 
   function drop() {

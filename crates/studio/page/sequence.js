@@ -244,9 +244,8 @@ export function recorder() {
   function take(command) {
     const { do: word, node } = command;
     if (word === "stop_all") {
-      held = null;
       jogs.clear();
-      return [...nodes].map((node) => ({ do: "quick_stop", node }));
+      return [...endHeld(), ...[...nodes].map((node) => ({ do: "quick_stop", node }))];
     }
     if (word === "jog_end") return jogs.delete(node) ? [{ do: "stop", node }] : [];
     if (word === "group_end") return endHeld();
@@ -308,7 +307,12 @@ function withTrials(steps) {
 }
 
 /** As programs say it: where one command is several of a page. */
-const asSaid = (steps) => withTimes(withTrials(steps));
+const asSaid = (steps) => withTimes(withTrials(steps), isReplaced);
+/** Another command to one of its drives ends a held motion. */
+const isReplaced = (held, command) => !LEAVE_MOTION.includes(command.do) && !isHeld(command) && nodesOf(command).some((node) => nodesOf(held).includes(node));
+
+/** A virtual bus begins and ends with each command: a program needs one that stays. */
+const isVirtual = (bus) => /^sim(:|$)/.test(bus);
 
 /** As commands of a shell; `bus` as the studio has it, `models` is the model of each node. */
 export function commandLine(steps, bus, models = []) {
@@ -318,8 +322,8 @@ export function commandLine(steps, bus, models = []) {
     const said = ROWS[step.command.do].cli(step.command, named);
     return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
   });
-  // A virtual bus begins and ends with each command: there it has to be one that stays, served by ferrodrive sim.
-  const export_ = bus === "sim" ? "export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim --serve socketcand://127.0.0.1:29536" : `export FERRODRIVE_BUS='${bus}'`;
+  // One that is served by ferrodrive sim.
+  const export_ = isVirtual(bus) ? "export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim --serve socketcand://127.0.0.1:29536" : `export FERRODRIVE_BUS='${bus}'`;
   const known = [...named].map(([node, model]) => ` --model ${node}=${model}`);
   const own = known.length ? [`ferrodrive() { command ferrodrive${known.join("")} "$@"; }`] : [];
   return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ""].join("\n");
@@ -335,20 +339,22 @@ export function python(steps, bus, models = []) {
     const own = Array.isArray(said) ? said : [`node_${step.command.node}.${said}`];
     return [...(pause === null ? [] : [`network.sleep(${pause})`]), ...own].map((text) => `    ${text}`);
   });
-  const on = bus === "sim" ? "socketcand://127.0.0.1:29536/can0" : bus;
+  const on = isVirtual(bus) ? "socketcand://127.0.0.1:29536/can0" : bus;
   return ["import ferrodrive", "", `with ferrodrive.Network("${on}") as network:`, ...nodes.map((node) => `    network.wait_for(${node})\n    node_${node} = network.drive(${node}${namedModel(node, known)})`), ...lines, ""].join("\n");
 }
 
 /** As a scenario for `ferrodrive run`; `models` is the model of each node, of which all that are known are in its machine. */
 export function scenario(steps, models) {
   const drives = models.map(({ node, model }) => `    { model = "${model}", node = ${node} },`);
-  const bases = [...new Set(steps.filter(({ command }) => command.do === "base_jog").map(({ command }) => baseOf(command)))];
-  const lines = withTimes(steps).flatMap((step, at) => {
+  const known = new Set(models.map(({ node }) => node));
+  const isKnown = (command) => nodesOf(command).every((node) => known.has(node));
+  const bases = [...new Set(steps.filter(({ command }) => command.do === "base_jog" && isKnown(command)).map(({ command }) => baseOf(command)))];
+  const lines = withTimes(steps, isReplaced).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     // Its machine has one base.
     const { command } = step;
     const isOther = command.do === "base_jog" && baseOf(command) !== bases[0];
-    const said = isOther ? [LEFT_OUT(`nodes ${nodesOf(command).join(", ")}: ${ROWS.base_jog.shown(command)}, as another base`)] : [ROWS[command.do].line(command)].flat();
+    const said = isOther ? [LEFT_OUT(`nodes ${nodesOf(command).join(", ")}: ${ROWS.base_jog.shown(command)}: ${isKnown(command) ? "another base" : "the models of its wheels are not known"}`)] : [ROWS[command.do].line(command)].flat();
     const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(isOfGroup(step.command) ? text : `${step.command.node} ${text}`)},`));
     return [...(pause === null ? [] : [`    "wait ${pause}s",`]), ...own];
   });

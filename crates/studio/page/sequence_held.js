@@ -13,14 +13,20 @@ export const isHeld = ({ do: word }) => word === "group_jog" || word === "base_j
 /** The nodes of a held motion, and of its end none; null of any other command. */
 export const heldNodes = ({ do: word, axes, wheels }) => ({ group_jog: () => axes.map(({ node }) => node), base_jog: () => wheels, group_end: () => [] })[word]?.() ?? null;
 
-/** Steps with `held_s` in each held motion in place of its end. */
-export function withTimes(steps) {
+/** Steps with `held_s` in each held motion in place of its end, which is also where `ends(held, command)` says so. */
+export function withTimes(steps, ends) {
   const said = [];
   let held = null;
   for (const { after_s, command } of steps) {
     if (held) held.held_s += after_s;
     if (command.do === "group_end") {
       held = null;
+      continue;
+    }
+    if (held && ends(held, command)) {
+      // Its pause was that of the held motion.
+      held = null;
+      said.push({ after_s: 0, command });
       continue;
     }
     const own = isHeld(command) ? { ...command, held_s: 0 } : command;

@@ -27,7 +27,7 @@ export function sequencePanel(isAccepted) {
   const status = h("span", { class: "quiet", role: "status", id: "sequence-status" });
   const list = h("ol", { class: "sequence", "aria-label": "Recorded commands" });
   const text = h("pre", { class: "code", id: "sequence-text", tabindex: "0", "aria-label": "The sequence as text" });
-  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, those of several drives together, also held ones, homing, NMT, PDOs, parameters that are typed in their row and stored, captures, test motions, gains that are found and tried, and values that are put back. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not; what follows gains that are found waits for them.");
+  const hint = h("p", { class: "quiet" }, "Recorded are power, motions, motions of several drives together (held ones too), homing, NMT, PDOs, parameters that are typed in their row and stored, captures, test motions, gains that are found and tried, and values that are put back. A jog is recorded as a turn that ends with a stop, and Stop as a quick stop of each drive. Motions are sent with the pauses between what was done, whether they were reached or not; what follows gains that are found waits for them.");
   const root = h("details", { class: "homing", id: "sequence" }, h("summary", {}, "Sequence: record, play, show as code"), h("div", { class: "bar" }, record, play, clear, form, save, status), list, text, hint);
   let steps = keptSteps(kept(KEY, []));
   /** What records; null while nothing is recorded. */
@@ -70,8 +70,8 @@ export function sequencePanel(isAccepted) {
     if (!recording || playing) return;
     const commands = recording.take(command);
     const full = commands.length > 0 && steps.length >= MOST;
-    // A stop is kept also behind the last one.
-    if (!full || commands.every(({ do: word }) => STOPS.includes(word))) append(commands);
+    // Stops are kept also behind the last one.
+    append(full ? commands.filter(({ do: word }) => STOPS.includes(word)) : commands);
     if (!full) return;
     record.click();
     setText(status, `at most ${MOST} commands: recording has ended`);

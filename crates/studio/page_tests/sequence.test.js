@@ -237,7 +237,7 @@ test("a held motion of several drives is recorded from its begin to its end, how
   assert.deepEqual(take({ do: "enable", node: 4 }), [{ do: "enable", node: 4 }], "another drive");
   assert.deepEqual(take({ do: "move", node: 2, degrees: 5, relative: true, rpm: null })[0], { do: "group_end" }, "one of its drives gets another command");
   take(turning);
-  assert.deepEqual(take({ do: "stop_all" }).map(({ do: word }) => word), ["quick_stop", "quick_stop", "quick_stop", "quick_stop"]);
+  assert.deepEqual(take({ do: "stop_all" }).map(({ do: word }) => word), ["group_end", "quick_stop", "quick_stop", "quick_stop", "quick_stop"]);
   assert.deepEqual(end(), []);
   take(turning);
   assert.deepEqual(end(), [{ do: "group_end" }], "the recording ends");
@@ -255,5 +255,11 @@ test("a held base has its time in each form, with the machine that it takes", ()
   for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)"]) assert.ok(program.includes(`${line}\n`), line);
   const run = scenario([...held, { after_s: 1, command: { ...base, wheels: [5, 4] } }], models);
   for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
-  assert.match(run, /^ {4}# left out: nodes 5, 4: .*as another base$/m);
+  assert.match(run, /^ {4}# left out: nodes 5, 4: .*: another base$/m);
+  // Something else to one of its drives ends it; what another drive gets meanwhile does not.
+  const next = (command) => commandLine([held[0], { after_s: 1, command: { do: "reset_fault", node: 4 } }, { after_s: 1, command }, { after_s: 3, command: { do: "enable", node: 4 } }], "can0", models);
+  assert.match(next({ do: "quick_stop", node: 4 }), /--for 2000ms\nferrodrive reset 4\nferrodrive quick-stop 4\nsleep 3\n/);
+  assert.match(next({ do: "quick_stop", node: 2 }), /--for 5000ms\n/);
+  assert.match(scenario(held, models.slice(1)), /^ {4}# left out: nodes 4, 5: .*the models of its wheels are not known$/m);
+  assert.match(commandLine(held, "sim:machine.toml", models), /^export FERRODRIVE_BUS=socketcand/m);
 });

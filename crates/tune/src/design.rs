@@ -74,7 +74,7 @@ pub struct Proposal {
     pub filter_s: f64,
     /// What they give.
     pub margins: Margins,
-    /// The bandwidth of the objective is not reached: a margin that has to be kept ends before.
+    /// The bandwidth of the objective is not reached: a margin that has to be kept, or the highest crossover, ends before.
     pub is_limited: bool,
 }
 

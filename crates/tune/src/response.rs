@@ -26,6 +26,8 @@ pub(crate) const COHERENT: f64 = 0.5;
 pub(crate) const DEVIATION: f64 = 0.01;
 /// How probable a coherence is, from which a frequency is taken to be seen, where nothing follows from the excitation.
 const CHANCE: f64 = 0.01;
+/// The share of lines that are most of them.
+const MOST: f64 = 0.8;
 /// How many frequencies it takes to say anything.
 const LEAST_LINES: usize = 12;
 /// Periods of an excitation: the first one is left out, since it begins at rest.
@@ -33,7 +35,7 @@ const LEAST_PERIODS: usize = 3;
 /// Segments of a capture without a period: with half of each overlapping, eight are as good as four or five apart.
 const SEGMENTS: usize = 8;
 /// The shortest segment.
-const LEAST_SEGMENT: usize = 64;
+const LEAST_SEGMENT: usize = 128;
 
 /// What was found at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +90,20 @@ impl Response {
     pub fn is_lost(&self) -> bool {
         let by_chance = 1.0 - CHANCE.powf(1.0 / (self.averages.max(2) - 1) as f64);
         self.lines.iter().filter(|line| line.coherence > by_chance).count() < LEAST_LINES
+    }
+
+    /// The highest frequency up to which most of the lines are coherent: a single one beyond may be so by chance. 0 where none is.
+    pub fn seen_hz(&self) -> f64 {
+        let mut coherent = 0;
+        let mut seen_hz = 0.0;
+        for (at, line) in self.lines.iter().enumerate() {
+            let counts = line.coherence >= COHERENT;
+            coherent += usize::from(counts);
+            if counts && coherent as f64 >= MOST * (at + 1) as f64 {
+                seen_hz = line.hz;
+            }
+        }
+        seen_hz
     }
 
     /// Whether enough of them count.

@@ -144,6 +144,8 @@ fn what_is_no_drive_of_a_base_is_refused() {
     let file = example("base.toml");
     refused(&["drive-base"], 2, "expected a machine file with a [base]");
     refused(&["drive-base", &example("two_axes.toml")], 1, "the machine file has no [base]");
+    let elsewhere = format!("sim:{}", example("two_axes.toml"));
+    refused(&["--bus", &elsewhere, "drive-base", &file, "--linear", "0.1", "--for", "1s"], 2, "two machine files");
     refused(&["drive-base", &file, "--linear", "0.3"], 2, "--for");
     refused(&["drive-base", &file, "--linear", "nan", "--for", "1s"], 2, "expected a finite number");
     refused(&["drive-base", &file, "--for", "1s", "--dead-man", "1s"], 2, "cannot be used with");

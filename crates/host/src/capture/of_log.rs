@@ -15,7 +15,7 @@ use super::quantity::Quantity;
 /// Readings of a log that are kept at most.
 const MOST: usize = 50_000_000;
 
-/// Of the cycles of SYNC between its first value and its last, a PDO that is sent by SYNC has come in as many at least.
+/// Of the cycles of SYNC between its first value and its last, and of its values, as many at least are one to one.
 const IN_CYCLES: f64 = 0.9;
 
 /// An object of a node as one direction of its PDOs has it: a demand that is sent to it and the same one sent back are two quantities.
@@ -28,8 +28,8 @@ struct LoggedObject {
     syncs_before: Vec<usize>,
 }
 
-/// The record of a log, with times from its first frame on. What comes once in each cycle of SYNC has the time of its SYNC, at which it was
-/// sampled (CiA 301, 7.2.2.3); all else that of its frame.
+/// The record of a log, with times from its first frame on. What comes once in each cycle of SYNC has the time of the SYNC before it, at
+/// which a synchronous TPDO was sampled (CiA 301, 7.2.2.2); all else that of its frame.
 ///
 /// # Errors
 /// In a sentence: no frame is a PDO whose mapping is known, with what to do about it; there are too many readings.
@@ -83,14 +83,20 @@ pub fn record_of_log(
 }
 
 impl LoggedObject {
-    /// Its series, by the times of SYNC where it comes in their cycles.
+    /// Its series, by the times of SYNC where it comes in their cycles. Of two in one cycle the first is late: the other one belongs to it.
     fn by_sync(mut self, syncs_s: &[f64]) -> Series {
-        let [first, .., last] = self.syncs_before[..] else { return self.series };
-        let is_once = self.syncs_before.windows(2).all(|pair| pair[0] < pair[1]);
-        if first > 0 && is_once && self.syncs_before.len() as f64 >= IN_CYCLES * (last - first + 1) as f64 {
-            for (point, before) in self.series.points.iter_mut().zip(self.syncs_before) {
-                point.0 = syncs_s[before - 1];
-            }
+        // How many SYNCs came before the log's part that has any.
+        let within = self.syncs_before.partition_point(|before| *before == 0);
+        let [first, .., last] = self.syncs_before[within..] else { return self.series };
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (before, (_, value)) in self.syncs_before[within..].iter().zip(&self.series.points[within..]) {
+            let at_s = syncs_s[before - 1];
+            points.pop_if(|point| point.0 == at_s);
+            points.push((at_s, *value));
+        }
+        let (cycles, count) = ((last - first + 1) as f64, self.syncs_before.len() - within);
+        if points.len() as f64 >= IN_CYCLES * cycles.max(count as f64) {
+            self.series.points = points;
         }
         self.series
     }
@@ -150,6 +156,41 @@ mod tests {
                 ("4.velocity_actual_value_rpm".to_owned(), &[(0.010, 60.0), (0.012, -60.0)][..]),
             ]
         );
+    }
+
+    /// It begins within a cycle; one frame comes behind the next SYNC, one in a cycle of its own is missing.
+    #[test]
+    fn what_comes_once_in_a_cycle_has_the_time_of_its_sync_also_where_single_frames_do_not() {
+        let node = NodeId::new(4).expect("a node-ID");
+        let mut decoder = Decoder::new();
+        decoder.set_model(node, devices::model("zlac8030l").expect("a model"));
+        let us = |us: u64| Instant::from_nanos(us * 1000);
+        let write = |data: [u8; 8], index: u8, sub: u8| {
+            [(us(0), frame(0x604, &data)), (us(0), frame(0x584, &[0x60, index, 0x1A, sub, 0, 0, 0, 0]))]
+        };
+        let speed = |at: u64, value: u8| (us(at), frame(0x184, &[value, 0, 0, 0]));
+        let mapped =
+            [write([0x23, 0x00, 0x1A, 1, 0x20, 0, 0x6C, 0x60], 0, 1), write([0x2F, 0x00, 0x1A, 0, 1, 0, 0, 0], 0, 0)];
+        let mut log: Vec<_> = mapped.into_iter().flatten().chain([speed(500, 7)]).collect();
+        for cycle in 1..=40_u64 {
+            let at = cycle * 1000;
+            if cycle == 21 {
+                log.push(speed(at + 50, 20));
+            }
+            log.push((us(at), frame(0x80, &[])));
+            log.extend((![20, 30].contains(&cycle)).then(|| speed(at + 200 + 7 * (cycle % 5), cycle as u8)));
+        }
+        log.sort_by_key(|(at, _)| *at);
+        let recorded = record_of_log(decoder, log).expect("it has PDOs");
+        let [series] = recorded.series.as_slice() else { panic!("one object") };
+        let expected: Vec<(f64, f64)> = (1..=40_u32)
+            .filter(|cycle| ![20, 30].contains(cycle))
+            .map(|cycle| (f64::from(cycle) * 1e-3, f64::from(cycle) * 0.1))
+            .collect();
+        assert_eq!(series.points.len(), expected.len());
+        for ((at, value), (its, should)) in series.points.iter().zip(&expected) {
+            assert!((at - its).abs() < 1e-9 && (value - should).abs() < 1e-9, "{at}: {value}");
+        }
     }
 
     #[test]

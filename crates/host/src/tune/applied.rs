@@ -65,8 +65,8 @@ fn check_no_former(request: &Request, id: NodeId) -> Result<(), Failure> {
     request.journal.as_deref().map(former_gains).map_or(Ok(()), |path| Kept::check_free(&path, id))
 }
 
-/// Has a drive try gains that were [found](find): a step with what it has, with the position loop a move there and back too, a
-/// transaction, and the same again. It keeps them where its current does not swing, its error is not larger, a move settles and goes no
+/// Has a drive try gains that were [found](find): a step and a slow speed with what it has, with the position loop a move there and back
+/// too, a transaction, and the same again. It keeps them where its current does not swing, its error is not larger, a move settles and goes no
 /// farther beyond, and `wants_back` is false, which is asked last. Else the drive has in the end what it had.
 ///
 /// # Errors
@@ -89,7 +89,7 @@ pub async fn try_gains(
         let why = "a move is not tried on this drive: it shows no speed or no current, or has no profile position";
         report.notes.push(why.to_owned());
     }
-    let tried = if moves { "a step and a move" } else { "a step" };
+    let tried = if moves { "a step, a slow speed and a move" } else { "a step and a slow speed" };
     progress.show(format!("node {id}: {tried} with the gains that it has"));
     // The first thing that a step does to the current is proportional to it.
     let most_rpm = ENOUGH_CURRENT * request.bounds.current_a / proposed.proportional_a_s_rad / RAD_S_PER_RPM;
@@ -210,9 +210,10 @@ fn objection(before: &Answers, after: &Answers, request: &Request, report: &Tune
     let of_twin_a = MORE_THAN_TWIN * report.curves.twin[1].step.ripple_a();
     let slow_a = MORE_THAN_TWIN * before.slow_ripple_a.max(usual_a);
     // A drive that is to be slower than it was may be off by more.
+    let is_slower = report.after.crossover_hz < report.before.crossover_hz;
     let most_error = match request.objective {
-        Objective::PhaseMargin(_) => before.step.error(),
-        Objective::Bandwidth(_) => {
+        Objective::PhaseMargin(_) if !is_slower => before.step.error(),
+        _ => {
             let size = |answer: &StepResponse| answer.step_rpm.1 - answer.step_rpm.0;
             let of_twin = report.curves.twin[1].step.error() * size(&after.step) / size(&report.curves.twin[1].step);
             before.step.error().max(MORE_THAN_TWIN * of_twin)

@@ -139,8 +139,9 @@ const STEADY_S: f64 = 0.6;
 const STEADY_SHARES: [f64; 6] = [0.35, -0.35, 1.0, -1.0, 0.65, -0.65];
 /// Speed on which the excitation lies, as a share of the highest: the shaft never turns back, where dry friction would change its sign.
 const BIAS_SHARE: f64 = 0.5;
-/// Slow, as a share of the highest speed.
+/// Slow, as a share of the highest speed, and at least: drives count whole r/min (60FFh of the ZLAC8030L).
 const SLOW_SHARE: f64 = 0.01;
+const SLOW_RPM: f64 = 1.0;
 /// The excitation's peak, as a share of the highest speed: to begin with, and at most.
 const SMALL: f64 = 0.08;
 const LARGEST: f64 = 0.4;
@@ -360,7 +361,7 @@ impl Bench {
     /// # Errors
     /// See [`follow`](Self::follow).
     pub async fn slow_ripple_a(&mut self) -> Result<f64, Failure> {
-        Ok(self.steady(SLOW_SHARE * self.bounds.speed_rpm).await?.1)
+        Ok(self.steady((SLOW_SHARE * self.bounds.speed_rpm).max(SLOW_RPM)).await?.1)
     }
 
     /// Steady speeds, then an excitation that grows until it is seen well, within the bounds.

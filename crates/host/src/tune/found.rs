@@ -80,9 +80,9 @@ impl Found {
         self.friction.viscous_a_s_rad * self.torque_constant_nm_a
     }
 
-    /// The highest frequency at which the shaft was seen to follow, Hz; infinite where it is described and not measured.
+    /// The highest frequency up to which the shaft was seen to follow, Hz; infinite where it is described and not measured.
     pub fn seen_hz(&self) -> f64 {
-        self.response.as_ref().map_or(f64::INFINITY, |seen| seen.coherent().last().map_or(0.0, |line| line.hz))
+        self.response.as_ref().map_or(f64::INFINITY, Response::seen_hz)
     }
 
     /// What comes late in the speed loop, from the current that it asks for to the speed that it compares, its filter apart.

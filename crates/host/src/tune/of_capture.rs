@@ -80,7 +80,7 @@ pub struct CaptureReport {
     pub picture: Poster,
 }
 
-/// Counts in a turn of a model's shaft as it is delivered; `None` where that depends on how it is set up.
+/// Counts in a turn of a model's shaft as it is delivered; `None` where its table does not say that.
 pub fn delivered_counts(model: &Description) -> Option<f64> {
     match model.axes.first()?.units.counts_per_turn {
         CountsPerTurn::Fixed(counts) => Some(f64::from(counts)),
@@ -186,7 +186,14 @@ impl<'a> UsedTraces<'a> {
         };
         let current = find(&CURRENTS).ok_or_else(|| lacks("current in A: current_demand_a or current_a"))?;
         let angle = find(&POSITIONS);
-        let motion = angle.or_else(|| find(&SPEEDS)).ok_or_else(|| lacks("motion: position_deg or velocity_rpm"))?;
+        let counts = || capture.traces.iter().any(|trace| trace.quantity.ends_with(COUNTS));
+        let motion = angle.or_else(|| find(&SPEEDS)).ok_or_else(|| match counts() {
+            true => format!(
+                "its position is in counts, and how many a turn has is not known: give the model (--model NODE=MODEL), or have velocity too; it has {}",
+                had()
+            ),
+            false => lacks("motion: position_deg or velocity_rpm"),
+        })?;
         Ok(Self { current, motion, is_angle: angle.is_some(), set_point: find(&SET_POINTS) })
     }
 

@@ -38,7 +38,7 @@ pub struct Proposed {
     pub after: Margins,
     /// Of the position loop around it, if that was asked for.
     pub position: Option<Margins>,
-    /// The bandwidth that was asked for is not reached: the margins end before.
+    /// The bandwidth that was asked for is not reached: the margins, or the highest crossover, end before.
     pub is_limited: bool,
 }
 

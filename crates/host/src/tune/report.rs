@@ -288,16 +288,22 @@ async fn calm(
         return Ok((proposed, None));
     }
     let (most_a, first_hz) = (most_a.max(twin.slow_ripple_a(&[], how).await?), proposed.after.crossover_hz);
+    let mut last_a = first_a;
     for _ in 0..SLOWER {
         let Ok(next) = of(SLOWER_BY * proposed.after.crossover_hz) else { break };
         proposed = next;
-        if twin.slow_ripple_a(&proposed.values(), how).await? <= most_a {
+        last_a = twin.slow_ripple_a(&proposed.values(), how).await?;
+        if last_a <= most_a {
             break;
         }
     }
-    let what =
-        "with gains that are faster the current of the twin swings at a slow speed, by the counts of its encoder";
-    Ok((proposed, Some(format!("{what}: by {first_a:.2} A with {first_hz:.0} Hz"))))
+    let why = "at a slow speed, because of its encoder's resolution";
+    let note = if last_a <= most_a {
+        format!("faster gains ({first_hz:.0} Hz) make the current of the twin swing by {first_a:.2} A {why}")
+    } else {
+        format!("these gains make the current of the twin swing by {last_a:.2} A {why}: no slower ones were found")
+    };
+    Ok((proposed, Some(note)))
 }
 
 /// Currents that the drive shows.
@@ -434,17 +440,14 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
             100.0 * found.gain_share
         ));
     }
+    let (reached, seen) = (proposed.after.crossover_hz, found.seen_hz());
     if proposed.is_limited {
-        notes.push(format!(
-            "the bandwidth that was asked for is not reached: the margins end at {:.1} Hz",
-            proposed.after.crossover_hz
-        ));
+        notes.push(format!("the bandwidth that was asked for is not reached: it ends at {reached:.1} Hz"));
     }
-    if proposed.after.crossover_hz > AT_ITS_END * found.seen_hz() {
-        let seen = found.seen_hz();
-        notes.push(format!(
-            "faster gains are not proposed: the shaft was seen to follow up to {seen:.0} Hz; a shorter --period shows more"
-        ));
+    let wants_more = proposed.is_limited || matches!(request.objective, Objective::PhaseMargin(_));
+    if wants_more && reached > AT_ITS_END * seen {
+        let shorter = if request.period > *PERIODS.start() { "; a shorter --period shows more" } else { "" };
+        notes.push(format!("faster gains are not proposed: the shaft was seen to follow up to {seen:.0} Hz{shorter}"));
     }
     if request.torque_constant_nm_a.is_none() {
         notes.push(format!(

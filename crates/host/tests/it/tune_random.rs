@@ -9,8 +9,8 @@ use std::time::Duration;
 use canopen::Mux;
 use host::capture::Restorer;
 use host::tune::{Bounds, Excursion, MoveRow, Request, TuneReport, Twin, find, motor_of};
-use master::MotionOptions;
 use master::units::Rpm;
+use master::{Error, MotionOptions};
 use sim::{MotorData, Place, Prng};
 use words::failure::Failure;
 
@@ -141,10 +141,11 @@ fn off_rpm(plant: &Twin, values: &[(Mux, i64)], motor: &MotorData) -> f64 {
             drive.node().download(*object, &(*value as u16).to_le_bytes()).await.unwrap();
         }
         drive.velocity(Rpm(90.0), MotionOptions { wait: false, ..MotionOptions::default() }).await.unwrap();
-        // A slow loop may not be there yet.
-        drive.supervise(Duration::from_secs(1)).await.ok();
+        drive.supervise(Duration::from_secs(1)).await
     };
-    sim::block_on(&mut world, turn).unwrap();
+    // A slow loop may not be there yet.
+    let seen = sim::block_on(&mut world, turn).unwrap();
+    assert!(seen.is_ok() || matches!(seen, Err(Error::NotReached(_))), "{seen:?}");
     let load = format!("load torque {}", 4.5 * motor.windings.torque_constant_nm_a());
     world.apply(Place::node(1), &load.parse().unwrap()).unwrap().unwrap();
     sim::block_on(&mut world, drive.supervise(Duration::from_secs(3))).unwrap().unwrap();

@@ -57,7 +57,11 @@ fn proposed_gains_do_not_swing_by_the_encoders_counts_and_that_is_said() {
     let mut excursion = Excursion::default();
     let run = find((&drive, &restorer), &request, &mut excursion);
     let (report, proposed) = sim::block_on(&mut world, run).unwrap().unwrap();
-    assert!(report.notes.iter().any(|note| note.contains("swings at a slow speed")), "{:?}", report.notes);
+    assert!(
+        report.notes.iter().any(|note| note.contains("swing by") && note.contains("at a slow speed")),
+        "{:?}",
+        report.notes
+    );
     let slow = (PERIOD, Bounds { speed_rpm: 1.0 / 0.75, ..Bounds::default() });
     let ripple_a = |values: &[(Mux, i64)]| tried(&plant, values, slow).step.ripple_a();
     // 2 % of 15 A on the twin, and some more on a plant that is not quite it.

@@ -72,7 +72,7 @@ def load_capture(path: File, node: Optional[int] = None) -> Capture:
 
 def tune_capture(path: File, node: Optional[int] = None, *, torque_constant: Optional[float] = None) -> CaptureTuning:
     """What a capture of any instrument shows of its drive: frequency response with coherence, masses, speed loop. Nothing moves. What
-    ``ferrodrive tune --capture`` does.
+    ``ferrodrive tune --capture`` does with such a file; logs of frames are for the command line.
 
     :param path: ``NAME.mcap`` or ``NAME.csv`` with ``current_demand_a`` or ``current_a``, ``position_deg`` or ``velocity_rpm``, and best of all
         ``velocity_demand_rpm``

@@ -429,7 +429,7 @@ class Drive(_Orders):
         :param travel_turns: farthest that the shaft may turn from where it stands
         :param period: time between two samples in s
         :param torque_constant: N m per A of another motor than the model's own
-        :param apply: write the values to the drive and measure once more; it has its former ones back where they are not better
+        :param apply: write the values to the drive and try them, with a step and a slow speed, with a position loop a move too; it has its former ones back where they are not better
         :param journal: as of :meth:`capture`
         :raises MasterError: it was stopped, what is not possible with this drive, or that not everything could be put back
 

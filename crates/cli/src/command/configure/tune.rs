@@ -7,6 +7,7 @@ use std::time::Duration;
 use canopen::NodeId;
 use host::network::params::journal::default_path;
 use host::tune::{Bounds, CaptureReport, MoveRow, RampReport, RampRequest, Request, TuneReport};
+use master::decode::Decoder;
 use master::units::{Amperes, Angle, Rpm, parse_duration};
 use recording::Capture;
 use sim::Place;
@@ -89,7 +90,7 @@ pub(crate) struct Tune {
     ///
     /// Of `capture`, `test-motion` or another instrument, NAME.mcap or NAME.csv: frequency response with coherence, masses and speed
     /// loop, by velocity_demand_rpm, current_demand_a or current_a, and position_deg or velocity_rpm. Or a log of frames (candump, BLF, ..)
-    /// whose PDOs have set-point, current and motion, with --model or --machine. No gains are proposed.
+    /// whose PDOs have set-point, current and motion, with --model or --machine. Up to a quarter of the rate of its rows; no gains are proposed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["apply", "bandwidth"])]
     capture: Option<PathBuf>,
     /// Of a stepper: inertia of what it turns, without its rotor, in kg·m²
@@ -256,8 +257,10 @@ impl Tune {
             Failure::bad_file(format!("the record {} has nothing of node {}", path.display(), self.node))
                 .because(reason)
         };
-        let recorded = read_record(path, context.decoder())?;
-        let model = context.models.get(&self.node).map(|stated| stated.description());
+        let mut decoder = Decoder::knowing(context.network.models());
+        context.named_models().for_each(|(node, model)| decoder.set_model(node, model));
+        let recorded = read_record(path, decoder)?;
+        let model = context.named_models().find(|(node, _)| *node == self.node).map(|(_, model)| model);
         let known = model.map(|model| model.name);
         let capture = Capture::of(&recorded, Some(Place::node(self.node.raw()))).map_err(unread)?;
         let mut report =

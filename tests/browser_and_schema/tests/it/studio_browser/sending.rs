@@ -6,6 +6,11 @@ use fantoccini::key::Key;
 
 use super::{Stage, press, speed};
 
+/// By script, while it plays: a press of a button that a late state has released would play again.
+const RELEASE: &str = "const of = document.querySelector('#sequence-play'); if (of.checked) of.click()";
+const HIDE: &str = "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
+                    document.dispatchEvent(new Event('visibilitychange')); delete document.hidden";
+
 impl Stage {
     async fn escape(&self) {
         self.client.perform_actions(press(Key::Escape.into())).await.expect("a key");
@@ -79,13 +84,9 @@ async fn a_play_that_ends_early_stops_what_it_moved() {
     stage.load().await;
     stage.take_the_wheel().await;
     stage.click("#sequence summary").await;
-    // By script, while it plays: a press of a button that a late state has released would play again.
-    let release = "const of = document.querySelector('#sequence-play'); if (of.checked) of.click()";
-    stage.play_ends(&["ended by the button"], async || drop(stage.script(release).await)).await;
+    stage.play_ends(&["ended by the button"], async || drop(stage.script(RELEASE).await)).await;
     assert!(stage.is_enabled(), "stopped by its ramp");
-    let hide = "Object.defineProperty(document, 'hidden', { value: true, configurable: true }); \
-                document.dispatchEvent(new Event('visibilitychange')); delete document.hidden";
-    stage.play_ends(&["ended: the page was hidden"], async || drop(stage.script(hide).await)).await;
+    stage.play_ends(&["ended: the page was hidden"], async || drop(stage.script(HIDE).await)).await;
     for stops in [true, false] {
         let stop = async || match stops {
             true => stage.escape().await,
@@ -98,6 +99,26 @@ async fn a_play_that_ends_early_stops_what_it_moved() {
         let wheel = stage.studio.state()["nodes"][super::WHEEL].clone();
         assert!(speed(&wheel) < 2.0 && wheel["drive"]["state"] != "Operation enabled", "{wheel}");
     }
+    stage.close().await;
+}
+
+/// A minute of a motion of two drives that the page holds: what ends the play ends that, and it is not held any more.
+#[tokio::test]
+#[ignore = "needs a browser: cargo xtask test --only studio"]
+async fn a_play_that_ends_early_lets_go_of_what_it_held() {
+    let stage = Stage::open("played_held").await;
+    let steps = "const axes = [{ node: 1, rpm: 5 }, { node: 4, rpm: 60 }]; \
+                 const steps = [{ after_s: 0, command: { do: 'group_jog', axes, rpm_per_s: 200 } }, { after_s: 60, command: { do: 'group_end' } }]; \
+                 localStorage.setItem('sequence', JSON.stringify(steps))";
+    stage.script(steps).await;
+    stage.load().await;
+    stage.take_the_wheel().await;
+    stage.click("#sequence summary").await;
+    stage.play_ends(&["ended by the button"], async || drop(stage.script(RELEASE).await)).await;
+    stage.play_ends(&["ended: the page was hidden"], async || drop(stage.script(HIDE).await)).await;
+    let stops = &["ended by Stop", "stopped by a press of stop"];
+    stage.play_ends(stops, async || stage.escape().await).await;
+    stage.play_ends(stops, async || stage.stop_from_elsewhere()).await;
     stage.close().await;
 }
 
