@@ -52,8 +52,8 @@ use crate::live::{Live, stop_what_moves};
 use crate::sheets::{model_of, node_id};
 use crate::world::World;
 
-/// How long is listened for a node before it is asked.
-const QUIET: Duration = Duration::from_secs(1);
+/// How long is listened for a node before it is asked: drives boot within that.
+const QUIET: Duration = Duration::from_secs(2);
 
 /// A CANopen network as its master sees it; `ferrodrive.Network` is what users have.
 #[pyclass(frozen, module = "ferrodrive._native")]

@@ -35,6 +35,31 @@ def test_a_sine_is_followed_and_captured_in_each_run(world):
         assert abs(world[5].velocity_rpm) < 1
 
 
+# 20 degrees and back in a second.
+SWING = [(at / 20, 10 - 10 * math.cos(math.tau * at / 20)) for at in range(21)]
+
+
+@pytest.mark.parametrize(
+    ("shape", "how", "speed_rpm"),
+    [
+        # A cosine of 20 degrees at 2 Hz, where the chirp ends.
+        ("chirp", {"by": 20, "frequency": 0.5, "to_frequency": 2.0, "time": 2.0}, 2 * math.tau * 20 / 360 * 60),
+        ("prbs", {"speed_rpm": 15, "time": 2.0}, 15.0),
+        ("path", {"path": SWING, "acceleration_rpm_s": 900.0}, math.tau * 10 / 360 * 60),
+    ],
+)
+def test_each_shape_moves_the_shaft_both_ways_as_fast_as_it_says_and_leaves_it_at_rest(world, shape, how, speed_rpm):
+    with ferrodrive.Network(world) as network:
+        network.wait_for(5)
+        (run,) = network.drive(5, "cia402").test_motion(shape, count=1, velocity_rpm=90, **how)
+        speeds = run["capture"]["values"]["velocity_rpm"]
+        # Where a set-point jumps, or turns off at a point of its path, the shaft overshoots.
+        for fastest in max(speeds), -min(speeds):
+            assert 0.8 * speed_rpm < fastest < (1.3 if shape == "chirp" else 2.5) * speed_rpm
+        network.sleep(0.1)
+        assert abs(world[5].velocity_rpm) < 1
+
+
 def test_what_is_true_of_a_drive_is_captured_with_what_it_says(world):
     with ferrodrive.Network(world) as network:
         network.wait_for(4)
@@ -70,7 +95,7 @@ def test_a_trigger_keeps_what_was_before_it_and_a_capture_is_a_file_that_reads_b
         ferrodrive.save_capture(capture, tmp_path / "step.txt")
     with pytest.raises(ferrodrive.MasterError, match="no values of node 5 are in it"):
         ferrodrive.load_capture(tmp_path / "step.csv", 5)
-    with pytest.raises(ferrodrive.MasterError, match="no current_demand_a"):
+    with pytest.raises(ferrodrive.MasterError, match="no current in A: current_demand_a"):
         ferrodrive.tune_capture(tmp_path / "step.csv")
     other = tmp_path / "letter.csv"
     other.write_text("Dear reader")

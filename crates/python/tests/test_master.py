@@ -226,7 +226,7 @@ def test_a_drive_that_booted_long_ago_and_says_nothing_is_waited_for():
     world.run_for(5)
     with ferrodrive.Network(world) as network:
         network.wait_for(4, within=3)
-        assert world.now < 5 + 1.1
+        assert world.now < 5 + 2.1
         with pytest.raises(ferrodrive.NoAnswer):
             network.wait_for(9, within=2.5)
-        assert 7.5 < world.now < 5 + 1.1 + 2.6
+        assert 7.5 < world.now < 5 + 2.1 + 2.6

@@ -13,7 +13,7 @@ export const isHeld = ({ do: word }) => word === "group_jog" || word === "base_j
 /** The nodes of a held motion, and of its end none; null of any other command. */
 export const heldNodes = ({ do: word, axes, wheels }) => ({ group_jog: () => axes.map(({ node }) => node), base_jog: () => wheels, group_end: () => [] })[word]?.() ?? null;
 
-/** Steps with `held_s` in each held motion in place of its end, which is also where `ends(held, command)` says so. */
+/** Steps with `held_s` in each held motion in place of its end, or of a command for which `ends(held, command)` is true. */
 export function withTimes(steps, ends) {
   const said = [];
   let held = null;

@@ -300,6 +300,24 @@ fn a_test_motion_is_judged_by_what_was_sampled() {
     assert!(refused.status == Some(1) && refused.err.contains("are allowed"), "{}", refused.err);
 }
 
+/// On a bus of its own, where no other program moves the drive: after a minute of its time.
+#[test]
+fn a_trigger_that_does_not_come_is_not_waited_for_for_ever() {
+    let place = scratch("captures-untriggered");
+    let file = place.path("run.csv");
+    let ended =
+        ferrodrive(&["capture", "4", "velocity", "--trigger", "velocity > 10", "--for", "50ms", "-o", &file, "--json"]);
+    let failure = ended.json();
+    assert_eq!(
+        (ended.status, &failure["error"]["kind"]),
+        (Some(1), &"no_trigger".into()),
+        "{} {}",
+        ended.out,
+        ended.err
+    );
+    assert!(!Path::new(&file).exists());
+}
+
 #[test]
 fn captures_are_taken_as_often_as_was_asked_for_each_into_a_file_of_its_own() {
     let place = scratch("captures-counted");

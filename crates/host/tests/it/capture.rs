@@ -337,6 +337,8 @@ fn whatever_point_a_capture_is_ended_at_the_tpdos_are_as_they_were() {
                 } else {
                     // Its owner does.
                     assert_eq!(bench.run(restorer.restore()), Vec::<String>::new(), "{name} {end_ms} ms");
+                    // Of two of them it has sent SYNC itself.
+                    assert_eq!(bench.network.with_core(|core| core.sync_period()), None, "{name} {end_ms} ms");
                 }
                 assert!(!path.exists(), "{name} {end_ms} ms");
                 let now = bench.tpdos();

@@ -415,7 +415,7 @@ class Network(Whole):
         await self._finish_soon(self._native.sleep(seconds))
 
     def wait_for(self, node: int, within: float = 5.0) -> None:
-        """Waits until a node was heard of: by its boot-up message, a heartbeat or an answer. One that has been silent for a second is
+        """Waits until a node was heard of: by its boot-up message, a heartbeat or an answer. One that has been silent for two seconds is
         asked for its device type (1000h): a drive that booted long ago may say nothing by itself.
 
         :param within: longest time to wait, in s

@@ -26,6 +26,9 @@ use console::numbers::whole;
 use plot::{Paint, Table};
 use words::time::some_time;
 
+/// How long a trigger is waited for where no other program can bring it about.
+const ARMED: Duration = Duration::from_secs(60);
+
 /// Capture quantities of a drive, fast
 ///
 /// Maps what is asked for into spare TPDOs, which the drive then sends by their event timer or with SYNC, and puts
@@ -232,10 +235,19 @@ impl Capture {
         for number in 1..=self.count {
             let waits = if span.trigger.is_some() { "armed" } else { "capturing" };
             context.progress.show(format!("node {}: {waits}, {number} of {}", self.node, self.count));
-            let Taken { mut capture, cut_off, .. } = match running.next(span).await {
+            let until = context.network.now() + ARMED + span.pre_trigger + span.duration;
+            // No other program acts on a bus of its own, whose time passes as fast as it can be computed.
+            let is_over = || context.is_embedded() && context.network.now() >= until;
+            let Taken { mut capture, cut_off, .. } = match running.next_until(span, is_over).await {
                 Ok(taken) => taken,
                 Err(failure) => return (rows, Some(failure.into())),
             };
+            if span.trigger.is_some() && cut_off.is_none() && capture.time_s.is_empty() {
+                let failure = Failure::new(format!("node {}: the trigger has not come within {ARMED:?}", self.node));
+                let failure = failure.of_kind("no_trigger").at_node(self.node);
+                let why = "the bus of this command is its own: no other program moves its drives";
+                return (rows, Some(failure.because(why).next("name a bus that others are on, as --bus can0")));
+            }
             let file = self.output.as_deref().map(|path| numbered(path, number));
             let of_file = file
                 .as_deref()

@@ -272,7 +272,18 @@ impl Report for Drawn {
 
 #[cfg(test)]
 mod tests {
-    use super::seconds;
+    use super::*;
+
+    #[test]
+    fn a_capture_that_is_aligned_has_its_trigger_at_0() {
+        let of = |about: &str| {
+            let text = format!("t_s,4.velocity_rpm,mark\n0,1,\"capture {{{about}}}\"\n0.25,2,\n1,3,\n");
+            triggered(Path::new("run.csv"), read(Kind::Csv, text.as_bytes()).expect("a record"))
+        };
+        let aligned = of(r#"""trigger_s"":0.25"#).expect("it has one");
+        assert_eq!(aligned.series[0].points, [(-0.25, 1.0), (0.0, 2.0), (0.75, 3.0)]);
+        assert!(of("").is_err_and(|failure| failure.what.contains("has no trigger")));
+    }
 
     #[test]
     fn a_bare_number_is_in_seconds_and_a_wrong_unit_is_refused() {
