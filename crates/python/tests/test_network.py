@@ -367,6 +367,24 @@ def test_the_report_about_a_node_is_the_page_of_the_command_line(tmp_path):
     assert sections[0] == sections[1] and len(sections[0]) > 5
 
 
+def test_the_report_has_the_faults_that_are_gone_too(tmp_path):
+    world = ferrodrive.World(bitrate=1_000_000)
+    world.add("cia402", node=5)
+    with ferrodrive.Network(world) as network:
+        network.wait_for(5)
+        world[5].apply("supply 449")
+        network.sleep(1)
+        world[5].apply("supply 300")
+        # Its capacitors discharge.
+        network.sleep(20)
+        network.drive(5, "cia402").reset_fault()
+        report = network.report(5, tmp_path / "servo.html")
+    # CiA 301, 7.2.7.2 and CiA 402-2: DC link over-voltage.
+    assert report["fault"] is None and report["remembered"][0]["code"] == 0x3210
+    page = (tmp_path / "servo.html").read_text(encoding="utf-8")
+    assert "No fault is present." in page and "3210h" in page and "remembers no errors" not in page
+
+
 def test_the_types_of_reports_have_the_fields_that_there_are(network, tmp_path):
     network.boot()
     parameters, kept, wanted = network.params(1), tmp_path / "kept.toml", tmp_path / "wanted.toml"

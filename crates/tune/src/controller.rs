@@ -29,7 +29,7 @@ pub struct Loop {
     pub asked_late_s: f64,
     /// How late the speed is seen in the current, the filter apart.
     pub seen_late_s: f64,
-    /// Root mean square of the relative difference from what was measured.
+    /// Root mean square of the relative differences from what was measured of current and speed; of less coherent lines they count less.
     pub off: f64,
 }
 

@@ -6,7 +6,7 @@ use canopen::{Mux, NodeId};
 use serde_json::{Value, json};
 
 use super::{ARM, PRESENCE_SPAN, STOPPED_WITHIN, Stage, WHEEL, play, play_acts, to, velocity};
-use crate::command::{Command, NodeCommand, ParameterChange, SessionCommand, TuneCommand};
+use crate::command::{CaptureCommand, Command, NodeCommand, ParameterChange, SessionCommand, TuneCommand};
 use crate::tune::{LoadOrder, Order};
 use master::drive;
 use sim::{Place, World};
@@ -122,6 +122,16 @@ fn a_page_has_gains_found_and_tried_and_goes_back_with_one_command() {
                 assert_eq!(json!(now), gain["after"], "{gain}");
             }
             assert_ne!(stage.gains().await, had);
+            // The report has both, and what the drive made of them.
+            let asked = CaptureCommand::Report { at: "2026-11-30".into(), by: None };
+            let report = page.knows(NodeCommand::Capture(asked).to(WHEEL)).await;
+            let html = report["html"].as_str().expect("a page");
+            assert!(html.contains("Error after a step, on the drive"), "{html}");
+            for gain in tried["gains"].as_array().expect("rows") {
+                for value in [&gain["before"], &gain["after"]] {
+                    assert!(html.contains(&format!(">{value}<")), "{gain}");
+                }
+            }
             stage.has_come_back(tpdo).await;
             assert_eq!(page.refused(of(WHEEL, TuneCommand::TryGains {})).await.0, "nothing_proposed", "once");
             page.must(NodeCommand::Change(ParameterChange::RollBack {}).to(WHEEL)).await;
