@@ -25,8 +25,8 @@ pub(crate) fn step() -> Tally {
     if without_axe.is_some() {
         arguments.extend(["--skip", "studio_browser::axe::"]);
     }
-    // Two browsers at a time: each takes some hundred megabytes and, half of its time, a core.
-    let how = How { programs: 1, threads: 2, arguments: &arguments };
+    // Three browsers at a time: each takes some hundred megabytes, and waits most of its time.
+    let how = How { programs: 1, threads: 3, arguments: &arguments };
     let tally = test_programs::build_and_run(SCHEMA_AND_BROWSER, how);
     match without_axe {
         Some(reason) if tally.failed == 0 => {
