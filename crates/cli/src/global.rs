@@ -149,7 +149,7 @@ impl Global {
     /// Refuses a file that a command names where `--machine` names another one.
     pub(crate) fn refuse_another(&self, path: &Path) -> Result<(), Failure> {
         match &self.machine_file {
-            Some(other) if other.is_typed && other.path != path => Err(two_files(path, &other.path)),
+            Some(other) if other.is_typed && !is_same_file(&other.path, path) => Err(two_files(path, &other.path)),
             _ => Ok(()),
         }
     }

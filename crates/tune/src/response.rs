@@ -202,8 +202,8 @@ fn averaged(samples: &Samples) -> Result<Response, Unusable> {
     let starts: Vec<_> = (1..).step_by(len / 2).take_while(|start| start + len <= samples.len()).collect();
     let mut spectra = Spectra::new(samples, len, hann);
     starts.iter().for_each(|start| spectra.add(*start));
-    // What the window spreads over its neighbours says nothing of its own.
-    // And beyond a quarter of the rate most is what happened between two samples.
+    // What the window spreads over its neighbours says nothing of its own, and beyond a quarter of the rate most is what happened between
+    // two samples.
     Ok(spectra.response(3..len / 4, starts.len()))
 }
 

@@ -85,16 +85,16 @@ pub fn record_of_log(
 impl LoggedObject {
     /// Its series, by the times of SYNC where it comes in their cycles. Of two in one cycle the first is late: the other one belongs to it.
     fn by_sync(mut self, syncs_s: &[f64]) -> Series {
-        // How many SYNCs came before the log's part that has any.
-        let within = self.syncs_before.partition_point(|before| *before == 0);
-        let [first, .., last] = self.syncs_before[within..] else { return self.series };
+        // What came before the first SYNC of the log belongs to none.
+        let begin = self.syncs_before.partition_point(|before| *before == 0);
+        let [first, .., last] = self.syncs_before[begin..] else { return self.series };
         let mut points: Vec<(f64, f64)> = Vec::new();
-        for (before, (_, value)) in self.syncs_before[within..].iter().zip(&self.series.points[within..]) {
+        for (before, (_, value)) in self.syncs_before[begin..].iter().zip(&self.series.points[begin..]) {
             let at_s = syncs_s[before - 1];
             points.pop_if(|point| point.0 == at_s);
             points.push((at_s, *value));
         }
-        let (cycles, count) = ((last - first + 1) as f64, self.syncs_before.len() - within);
+        let (cycles, count) = ((last - first + 1) as f64, self.syncs_before.len() - begin);
         if points.len() as f64 >= IN_CYCLES * cycles.max(count as f64) {
             self.series.points = points;
         }

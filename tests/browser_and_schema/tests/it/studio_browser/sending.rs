@@ -119,6 +119,7 @@ async fn a_play_that_ends_early_lets_go_of_what_it_held() {
     let stops = &["ended by Stop", "stopped by a press of stop"];
     stage.play_ends(stops, async || stage.escape().await).await;
     stage.play_ends(stops, async || stage.stop_from_elsewhere()).await;
+    stage.studio.wait("the joint rests too", |state| speed(&state["nodes"][0]) < 1.0);
     stage.close().await;
 }
 
