@@ -323,7 +323,7 @@ export function commandLine(steps, bus, models = []) {
     return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
   });
   // One that is served by ferrodrive sim.
-  const export_ = isVirtual(bus) ? "export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim --serve socketcand://127.0.0.1:29536" : `export FERRODRIVE_BUS='${bus}'`;
+  const export_ = isVirtual(bus) ? `export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim${bus === "sim" ? "" : ` --machine ${quoted(bus.slice("sim:".length))}`} --serve socketcand://127.0.0.1:29536` : `export FERRODRIVE_BUS='${bus}'`;
   const known = [...named].map(([node, model]) => ` --model ${node}=${model}`);
   const own = known.length ? [`ferrodrive() { command ferrodrive${known.join("")} "$@"; }`] : [];
   return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ""].join("\n");

@@ -261,5 +261,5 @@ test("a held base has its time in each form, with the machine that it takes", ()
   assert.match(next({ do: "quick_stop", node: 4 }), /--for 2000ms\nferrodrive reset 4\nferrodrive quick-stop 4\nsleep 3\n/);
   assert.match(next({ do: "quick_stop", node: 2 }), /--for 5000ms\n/);
   assert.match(scenario(held, models.slice(1)), /^ {4}# left out: nodes 4, 5: .*the models of its wheels are not known$/m);
-  assert.match(commandLine(held, "sim:machine.toml", models), /^export FERRODRIVE_BUS=socketcand/m);
+  assert.match(commandLine(held, "sim:machine.toml", models), /^export FERRODRIVE_BUS=socketcand\S+ {2}# ferrodrive sim --machine 'machine\.toml' --serve socketcand/m);
 });
