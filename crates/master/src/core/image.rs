@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use can::{CanId, Frame, Instant, MAX_DATA_LENGTH};
-use canopen::pdo::PdoNumber;
+use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
 
 use super::field::{ImagePlace, bits_of, mask_of};
@@ -122,6 +122,15 @@ impl ProcessImage {
             (pdo.id, pdo.map, pdo.at) = (None, PdoMap::default(), None);
         }
         self.index();
+    }
+
+    /// Of an object that was written: where it is the mapping of a PDO, frames of that PDO are something else now, until it is set again.
+    pub(super) fn forget_mapping(&mut self, node: NodeId, index: u16) {
+        match PdoId::of_object(index) {
+            Some((PdoId { direction: Direction::Tpdo, number }, true)) => self.remove_tpdo(node, number),
+            Some((PdoId { direction: Direction::Rpdo, number }, true)) => self.remove_rpdo(node, number),
+            _ => {}
+        }
     }
 
     /// Prepares a node's RPDO for sending under `id`, all bits zero. What it carries stays where that is so already.

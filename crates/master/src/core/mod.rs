@@ -333,6 +333,9 @@ impl Core {
             self.note_outcome(node, ended.mux, &ended.outcome);
             if ended.downloads {
                 self.member_mut(node).facts.written_at = Some(now);
+                if !matches!(ended.outcome, Err(Failure::Aborted(_))) {
+                    self.image_mut().forget_mapping(node, ended.mux.index);
+                }
             }
             if ended.ticket != FEED {
                 self.finished.push_back(Finished { ticket: ended.ticket, outcome: ended.outcome });

@@ -250,6 +250,34 @@ fn a_tpdo_is_configured_saved_and_comes_back_after_a_power_cycle() {
     assert!(network.now() - received.at <= Duration::from_millis(51), "{received:?}");
 }
 
+/// What the TPDO carries then is not a statusword, though it comes under the same identifier (CiA 301, 7.5.2.36: the mapping is changed while the
+/// PDO is off).
+#[test]
+fn a_tpdo_whose_mapping_is_written_by_itself_is_not_taken_for_what_it_was() {
+    let (mut world, network, drives) = world(&[4]);
+    let node = drives[0].node().clone();
+    let config = PdoConfig::new(TPDO1, PdoMap(vec![MappingRecord::from_raw(0x6041_0010)]));
+    let config = config.event_time(Duration::from_millis(5));
+    block_on(&mut world, async {
+        node.configure_pdo(&config, TimerUnits::of(model("zlac8030l").unwrap())).await.unwrap();
+        node.nmt(NmtCommand::Start);
+        network.sleep(Duration::from_millis(50)).await;
+        assert!(network.received(node.id(), mux(0x6041, 0)).is_some());
+        let cob_id: u32 = node.read(mux(0x1800, 1)).await.unwrap();
+        node.write(mux(0x1800, 1), cob_id | 1 << 31).await.unwrap();
+        node.write(mux(0x1A00, 0), 0_u8).await.unwrap();
+        node.write(mux(0x1A00, 1), 0x606C_0020_u32).await.unwrap();
+        node.write(mux(0x1A00, 0), 1_u8).await.unwrap();
+        node.write(mux(0x1800, 1), cob_id).await.unwrap();
+        network.sleep(Duration::from_millis(50)).await;
+        assert_eq!(network.received(node.id(), mux(0x6041, 0)), None);
+        // It is led by what its statusword says.
+        drives[0].velocity(Rpm(60.0), MotionOptions::default()).await.unwrap();
+        drives[0].stop().await.unwrap();
+    })
+    .unwrap();
+}
+
 #[test]
 fn a_boot_up_is_seen_after_a_reset() {
     let (mut world, _, drives) = world(&[4]);
