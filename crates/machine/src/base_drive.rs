@@ -42,16 +42,15 @@ impl FromStr for BaseDrive {
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || format!("expected: {}", Self::FORM);
         let (mut linear, mut angular, mut time) = (None, None, None);
-        let mut words = text.split_whitespace();
-        while let Some(word) = words.next() {
-            let mut value = || words.next().ok_or_else(|| format!("'{word}' has no value; {}", expected()));
+        words::line::take(Self::FORM, text.split_whitespace(), |word, value| {
             match word {
                 "linear" => linear = Some(finite(value()?)?),
                 "angular" => angular = Some(finite(value()?)?),
                 "for" => time = Some(some_time(value()?)?),
-                _ => return Err(format!("'{word}' is not a part of drive-base; {}", expected())),
+                _ => return Ok(false),
             }
-        }
+            Ok(true)
+        })?;
         let time = time.ok_or_else(|| format!("it needs a time, as in: for 3s; {}", expected()))?;
         if linear.or(angular).is_none() {
             return Err(format!("it needs a speed in m/s, a rate of turn in rad/s, or both; {}", expected()));

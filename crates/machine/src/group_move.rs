@@ -13,6 +13,7 @@ use master::{Drive, cyclic::CyclicOptions};
 
 use crate::file::{CyclePlan, GROUP_PERIOD, GroupPlan, Machine};
 use words::failure::Failure;
+use words::line;
 use words::mode::mode;
 use words::node::node;
 use words::time::some_time;
@@ -119,6 +120,18 @@ pub fn turning(text: &str) -> Result<Rpm, String> {
     }
 }
 
+/// Turns of a shaft: `20turn`, `90deg`; a number alone is turns.
+///
+/// # Errors
+/// What is expected.
+pub fn turns(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>().map_or_else(|_| text.parse(), |turns| Ok(Angle::Turns(turns))) {
+        Ok(Angle::Turns(turns)) => Ok(turns),
+        Ok(Angle::Counts(_)) => Err("expected an angle in turns or degrees, e.g. 20turn or 90deg".into()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 /// A rate above 0, in turns/s^2.
 ///
 /// # Errors
@@ -167,17 +180,22 @@ impl FromStr for GroupMove {
 
     /// What stands behind `group` in a line of a scenario: its [form](GroupMove::FORM).
     fn from_str(text: &str) -> Result<Self, String> {
+        let form = format!("group {}", Self::FORM);
         let mut words = text.split_whitespace().peekable();
         if words.next() != Some("move") {
-            return Err(format!("'group {text}' is not a command of a group; expected: group {}", Self::FORM));
+            return Err(format!("'group {text}' is not a command of a group; expected: {form}"));
         }
         let mut asked = Self { relative: words.next_if_eq(&"by").is_some(), ..Self::default() };
-        asked.take_words(Self::FORM, words, |asked, word| {
-            let is_target = word.contains('=');
-            if is_target {
-                asked.targets.push(target(word)?);
+        line::take(&form, words, |word, value| match word {
+            "within" => {
+                asked.within = Some(some_time(value()?)?);
+                Ok(true)
             }
-            Ok(is_target)
+            word if word.contains('=') => {
+                asked.targets.push(target(word)?);
+                Ok(true)
+            }
+            _ => asked.take(word, value),
         })?;
         asked.check().map_err(|failure| failure.one_line())?;
         Ok(asked)
@@ -189,42 +207,23 @@ impl GroupMove {
     pub const FORM: &str = "move [by] NODE=POSITION.. [of GROUP] [at SPEED] [acceleration RATE] [rounding TIME] \
                             [following-error ANGLE] [period TIME] [mode MODE] [within TIME] [hold TIME]";
 
-    /// Takes the words of a line: options of its form with their values, and words that stand `alone` and that this takes.
+    /// Takes an option of a line that a path has too; false for another word. See [`line::take`].
     ///
     /// # Errors
-    /// A word that is neither, or a bad value.
-    pub fn take_words<'a>(
-        &mut self,
-        form: &str,
-        words: impl Iterator<Item = &'a str>,
-        mut alone: impl FnMut(&mut Self, &str) -> Result<bool, String>,
-    ) -> Result<(), String> {
-        let mut words = words.peekable();
-        while let Some(word) = words.next() {
-            if alone(self, word)? {
-                continue;
-            }
-            let is_option = form
-                .split('[')
-                .any(|part| part.split_once(' ').is_some_and(|(name, rest)| name == word && rest.contains(']')));
-            let what = form.split(' ').next().unwrap_or_default();
-            let value = words.next_if(|_| is_option).ok_or_else(|| match is_option {
-                true => format!("'{word}' has no value; expected: group {form}"),
-                false => format!("'{word}' is not a part of group {what}; expected: group {form}"),
-            })?;
-            match word {
-                "of" => self.group = Some(value.to_owned()),
-                "at" => self.velocity = Some(turning(value)?),
-                "acceleration" => self.acceleration = Some(rate(value)?),
-                "rounding" => self.rounding = Some(some_time(value)?),
-                "following-error" => self.following_error = Some(angle(value)?),
-                "period" => self.period = Some(some_time(value)?),
-                "mode" => self.mode = Some(mode(value)?),
-                "hold" => self.hold = Some(some_time(value)?),
-                _ => self.within = Some(some_time(value)?),
-            }
+    /// A bad value.
+    pub fn take<'a>(&mut self, word: &str, value: &mut dyn FnMut() -> Result<&'a str, String>) -> Result<bool, String> {
+        match word {
+            "of" => self.group = Some(value()?.to_owned()),
+            "at" => self.velocity = Some(turning(value()?)?),
+            "acceleration" => self.acceleration = Some(rate(value()?)?),
+            "rounding" => self.rounding = Some(some_time(value()?)?),
+            "following-error" => self.following_error = Some(angle(value()?)?),
+            "period" => self.period = Some(some_time(value()?)?),
+            "mode" => self.mode = Some(mode(value()?)?),
+            "hold" => self.hold = Some(some_time(value()?)?),
+            _ => return Ok(false),
         }
-        Ok(())
+        Ok(true)
     }
 
     fn check(&self) -> Result<(), Failure> {

@@ -304,7 +304,7 @@ mod tests {
             ("group follow path.csv period", "'period' has no value"),
             ("drive-base forward", "expected: drive-base [linear M/S]"),
             ("boot now", "expected: boot [node NODE].."),
-            ("boot node", "'node' has no node-ID"),
+            ("boot node", "'node' has no value; expected: boot [node NODE].."),
             ("boot node 200", "node-ID"),
             ("4 params", "NODE params verify [FILE]"),
             ("4 params frob", "NODE params apply [FILE] [save]"),

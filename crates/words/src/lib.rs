@@ -8,6 +8,7 @@ pub mod decode;
 pub mod document;
 pub mod drive;
 pub mod failure;
+pub mod line;
 pub mod mode;
 pub mod models;
 pub mod node;

@@ -56,11 +56,11 @@ impl FromStr for FollowLine {
             return Err(format!("'group {text}' names no path; expected: group {}", Self::FORM));
         };
         let (mut approach, mut options) = (false, GroupMove::default());
-        options.take_words(Self::FORM, words, |options, word| {
+        words::line::take(&format!("group {}", Self::FORM), words, |word, value| {
             match word {
                 "by" => options.relative = true,
                 "approach" => approach = true,
-                _ => return Ok(false),
+                _ => return options.take(word, value),
             }
             Ok(true)
         })?;

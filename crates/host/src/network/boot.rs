@@ -157,15 +157,15 @@ impl FromStr for BootOptions {
     /// What stands behind `boot` in a line of a scenario: its [form](BootOptions::FORM).
     fn from_str(text: &str) -> Result<Self, String> {
         let mut options = Self::default();
-        let mut words = text.split_whitespace();
-        while let Some(word) = words.next() {
+        words::line::take(Self::FORM, text.split_whitespace(), |word, value| {
             match word {
-                "node" => options.nodes.push(node(words.next().ok_or("'node' has no node-ID, as in: boot node 4")?)?),
+                "node" => options.nodes.push(node(value()?)?),
                 "reset" => options.reset = true,
                 "no-start" => options.no_start = true,
-                _ => return Err(format!("'{word}' is not a part of boot; expected: {}", Self::FORM)),
+                _ => return Ok(false),
             }
-        }
+            Ok(true)
+        })?;
         Ok(options)
     }
 }
