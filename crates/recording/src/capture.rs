@@ -122,6 +122,14 @@ impl Capture {
         places
     }
 
+    /// What a record has of a node; see [`Self::of`].
+    ///
+    /// # Errors
+    /// Those of [`Self::of`].
+    pub fn of_node(recorded: &Recorded, node: Option<u8>) -> Result<Self, String> {
+        Self::of(recorded, node.map(Place::node))
+    }
+
     /// What a record has of an axis; of its only one with `None`. Readings of all its traces at one time are one row.
     ///
     /// # Errors

@@ -9,8 +9,11 @@ use std::time::Duration;
 use can::Frame;
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{NmtCommand, NodeId};
+use host::capture::CaptureLine;
 use host::group_follow::FollowLine;
 use host::network::boot::BootOptions;
+use host::test_motion::TestMotionLine;
+use host::tune::TuneLine;
 use machine::base_drive::BaseDrive;
 use machine::group_move::GroupMove;
 use machine::parameters::Form;
@@ -43,7 +46,8 @@ const FORMS: &[&str] = &[
 
 /// Every form of a line of a host, for messages and the manual.
 pub fn forms() -> impl Iterator<Item = String> {
-    let of_drive = drive::Command::FORMS.iter().map(|form| format!("NODE {form}"));
+    let measured = [CaptureLine::FORM, TestMotionLine::FORM, TuneLine::FORM];
+    let of_drive = drive::Command::FORMS.iter().copied().chain(measured).map(|form| format!("NODE {form}"));
     let groups = [GroupMove::FORM, FollowLine::FORM].map(|form| format!("group {form}"));
     let shared = [BaseDrive::FORM.to_owned(), BootOptions::FORM.to_owned()];
     of_drive.chain(groups).chain(shared).chain(FORMS.iter().map(|form| (*form).to_owned()))
@@ -62,6 +66,12 @@ const PATIENCE: Duration = Duration::from_secs(10);
 pub enum Command {
     /// A command to a drive.
     Drive(Place, drive::Command),
+    /// A capture of a drive.
+    Capture(Place, CaptureLine),
+    /// A drive by a test motion, captured.
+    TestMotion(Place, Box<TestMotionLine>),
+    /// Gains for a drive.
+    Tune(Place, TuneLine),
     /// Several axes as one, to positions.
     Group(GroupMove),
     /// Several axes as one, along a recorded path beside the scenario.
@@ -160,6 +170,9 @@ fn of_node(place_word: &str, words: &[&str]) -> Result<Command, String> {
         ["nmt", command] => Ok(Command::Nmt(Some(id()?), nmt(command)?)),
         ["watch", period] => Ok(Command::Watch(id()?, time(period)?)),
         ["read", name] => Ok(Command::Read(id()?, object(name)?)),
+        ["capture", ref rest @ ..] => rest.join(" ").parse().map(|line| Command::Capture(place, line)),
+        ["test-motion", ref rest @ ..] => rest.join(" ").parse().map(|line| Command::TestMotion(place, Box::new(line))),
+        ["tune", ref rest @ ..] => rest.join(" ").parse().map(|line| Command::Tune(place, line)),
         ["params", ref rest @ ..] => {
             let (what, file) = parameters(rest)?;
             Ok(Command::Parameters(id()?, what, file))
@@ -268,6 +281,11 @@ mod tests {
             "drive-base linear 0.3 angular -0.2 for 3s",
             "boot",
             "boot node 4 node 5 reset no-start",
+            "4 capture velocity current for 2s rate 1ms",
+            "4 test-motion steps speed 60rpm count 3",
+            "5.2 test-motion sine by 10deg frequency 2",
+            "4 tune",
+            "4 tune bandwidth 20 loop position apply",
             "4 params apply",
             "4 params apply save",
             "4 params apply wheel.toml save",
@@ -311,6 +329,9 @@ mod tests {
             ("4 params frob wheel.toml", "NODE params apply [FILE] [save]"),
             ("4 params verify wheel.txt", ".toml"),
             ("4 params apply a.toml b.toml", "NODE params apply [FILE] [save]"),
+            ("4 capture velocity", "it needs a time"),
+            ("4 test-motion", "expected: test-motion SHAPE"),
+            ("4 tune fast", "expected: tune [phase-margin DEGREES]"),
             ("4 velocity", "NODE enable"),
             ("4 velocity fast", "does not begin with a number"),
             ("4 velocity 60rpm at 5rpm", "is not an option of velocity"),

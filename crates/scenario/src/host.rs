@@ -3,6 +3,7 @@
 //! What it waits for beyond the bus (a condition, a time) it asks of the [`HostBoard`], which the stepper of the world
 //! looks at.
 
+mod measured;
 mod whole;
 
 use std::cell::RefCell;
@@ -153,6 +154,9 @@ impl HostTask {
         let network = &self.network;
         match command {
             Command::Drive(place, command) => report(self.drive(*place)?.perform(command).await),
+            Command::Capture(place, asked) => self.capture(*place, asked).await,
+            Command::TestMotion(place, asked) => self.test_motion(*place, asked).await,
+            Command::Tune(place, asked) => self.tune(*place, asked).await,
             Command::Group(asked) => self.move_group(asked).await,
             Command::Follow(asked) => self.follow(asked).await,
             Command::Base(asked) => self.drive_base(asked).await,

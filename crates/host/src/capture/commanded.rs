@@ -8,6 +8,7 @@ use std::time::Duration;
 use can::{Bitrate, Instant};
 use canopen::NodeId;
 use futures_util::future::{Aborted, abortable};
+use machine::file::tpdo_id;
 use master::Drive;
 use recording::{Capture, Column, Recorded, Series, Subject};
 use serde_json::{Value, json};
@@ -91,6 +92,8 @@ impl Host {
         }
         let span = span_of(&order)?;
         let mut wanted = self.wanted(node, order.period_ms, order.sdo)?;
+        let take = order.take.iter().map(|text| tpdo_id(text)).collect::<Result<_, _>>();
+        wanted.take = take.map_err(|why| ("usage", why))?;
         check_size(order.quantities.len(), 1, &wanted, &span)?;
         let way_back = WayBack::in_network(&self.setting.ways_back);
         let restorer = way_back.of(&drive).clone();
@@ -290,8 +293,8 @@ fn outcome_of(
     Ok((vec![(name, capture, None)], value))
 }
 
-/// A failure in one text: what, why, and what to do.
-pub(crate) fn refusal(failure: &Failure) -> Refusal {
+/// A failure as its kind and one text: what, why, and what to do.
+pub fn refusal(failure: &Failure) -> Refusal {
     let Failure { kind, what, because, next, .. } = failure;
     let lines = std::iter::once(what).chain(because).chain(next).map(String::as_str);
     (*kind, lines.collect::<Vec<_>>().join("; "))

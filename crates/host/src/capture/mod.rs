@@ -4,6 +4,7 @@
 //! collects until a capture is whole. [`Restorer`] leads back, whatever ends it. [`merit`] has the figures of a response.
 
 pub(crate) mod commanded;
+mod line;
 mod measurand;
 pub mod merit;
 mod of_log;
@@ -17,6 +18,8 @@ mod session;
 mod ways_back;
 
 pub use crate::network::params::SeenBy;
+pub use commanded::refusal;
+pub use line::CaptureLine;
 pub use measurand::{Measurand, TRUE, TrueValue, Way};
 pub use of_log::record_of_log;
 pub use plain::Captured;

@@ -40,6 +40,9 @@ pub struct CaptureOrder {
     /// What is kept of before the trigger.
     #[serde(default)]
     pub pre_ms: f64,
+    /// TPDOs that are taken although they are in use: `tpdo1`.
+    #[serde(default)]
+    pub take: Vec<String>,
     /// What has no room in a TPDO is read by SDO.
     #[serde(default)]
     pub sdo: bool,

@@ -4,6 +4,7 @@
 //! What moves here is stopped by what stops a group and `velocity`: both note what they have set in motion.
 
 mod commanded;
+mod line;
 mod order;
 mod runs;
 mod shape;
@@ -15,6 +16,7 @@ use serde::Serialize;
 use crate::group_follow::stream;
 
 pub(crate) use commanded::cyclic;
+pub use line::TestMotionLine;
 pub use order::{Order, ShapeName};
 pub use runs::{Figures, Motion, Run, Travel, limits, run, steps, usual_quantities};
 pub use shape::{Shape, points};

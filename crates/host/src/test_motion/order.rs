@@ -113,6 +113,26 @@ pub struct Order {
 const MOST_RUNS: u32 = 999;
 
 impl Order {
+    /// One run of a shape with what is usual of all else.
+    pub const fn usual(shape: ShapeName) -> Self {
+        Self {
+            shape,
+            by_deg: 90.0,
+            speed_rpm: 20.0,
+            frequency_hz: 1.0,
+            to_frequency_hz: 10.0,
+            periods: 3,
+            time_s: 0.5,
+            path: Vec::new(),
+            count: 1,
+            velocity_rpm: 60.0,
+            acceleration_rpm_s: None,
+            travel_turns: None,
+            following_error_deg: 72.0,
+            period_ms: 5.0,
+        }
+    }
+
     /// What its points keep to; of steps, with what the drive has for that.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ const EVENT_TIMER: Mux = Mux::new(0x1800, 5);
 fn order(quantities: &[&str], duration_ms: f64, trigger: Option<&str>) -> CaptureOrder {
     let quantities = quantities.iter().map(|name| (*name).to_owned()).collect();
     let trigger = trigger.map(str::to_owned);
-    CaptureOrder { quantities, period_ms: 2.0, duration_ms, trigger, pre_ms: 0.0, sdo: false }
+    CaptureOrder { quantities, period_ms: 2.0, duration_ms, trigger, pre_ms: 0.0, take: Vec::new(), sdo: false }
 }
 
 fn captured(order: CaptureOrder) -> Command {
@@ -68,6 +68,10 @@ fn a_page_captures_with_the_rate_that_was_had_and_its_report_has_the_capture() {
         let before = stage.tpdo().await;
         page.must(velocity(WHEEL, 60.0)).await;
         stage.turns(WHEEL, 60.0).await;
+        let taking = |pdo: &str| captured(CaptureOrder { take: vec![pdo.to_owned()], ..wanted.clone() });
+        assert_eq!(page.refused(taking("rpdo1")).await.0, "usage");
+        page.knows(taking("tpdo1")).await;
+        assert_eq!(stage.tpdo().await, before);
         let came = page.knows(captured(wanted)).await;
         assert_eq!(stage.tpdo().await, before);
         let traces = came["traces"].as_array().expect("a list");

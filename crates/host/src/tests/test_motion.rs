@@ -47,8 +47,15 @@ fn test_of(node: NodeId, motion: Order) -> Command {
 
 fn capture() -> Command {
     let quantities = vec!["velocity".to_owned()];
-    let order =
-        CaptureOrder { quantities, period_ms: 2.0, duration_ms: 60_000.0, trigger: None, pre_ms: 0.0, sdo: false };
+    let order = CaptureOrder {
+        quantities,
+        period_ms: 2.0,
+        duration_ms: 60_000.0,
+        trigger: None,
+        pre_ms: 0.0,
+        take: Vec::new(),
+        sdo: false,
+    };
     NodeCommand::Capture(CaptureCommand::Capture(order)).to(WHEEL)
 }
 

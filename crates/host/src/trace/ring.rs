@@ -90,8 +90,13 @@ impl Trace {
         ring.begin_chunk();
     }
 
+    /// The model of a node, where it is known.
+    pub fn model(&self, node: NodeId) -> Option<&'static Description> {
+        self.lock().models.get(&node).copied()
+    }
+
     /// A decoder that has seen no frame, and knows the models of this bus's nodes.
-    pub(super) fn fresh_decoder(&self) -> Decoder {
+    pub fn fresh_decoder(&self) -> Decoder {
         let ring = self.lock();
         let mut decoder = Decoder::knowing(ring.known.clone());
         ring.models.iter().for_each(|(node, model)| decoder.set_model(*node, model));

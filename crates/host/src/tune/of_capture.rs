@@ -10,10 +10,11 @@ use devices::{CountsPerTurn, Description};
 use plot::{Figure, Poster};
 use recording::{Capture, Trace};
 use serde::Serialize;
+use sim::machine::is_built_in;
 use tune::{Mechanics, Response, Samples};
 use words::failure::Failure;
 
-use super::ResponseRow;
+use super::{ResponseRow, constant_of, motor_of};
 
 /// Signals by the names of their quantities without their units, the best first: those of captures, and those of objects in a log of frames.
 const SET_POINTS: [&str; 5] =
@@ -32,9 +33,14 @@ const SPEEDS: [&str; 2] = ["velocity", "velocity_actual_value"];
 /// How the name of a position ends that is not in degrees.
 const COUNTS: &str = "_counts";
 
-/// Times between two rows that are as much longer than the others are gaps; and as much shorter than that they are all equal.
+/// Times between two rows that are as much longer than the others are gaps.
 const GAP: f64 = 1.5;
+/// How much they may differ, as a share of them, to be taken as equal; and how much to be read at equal times between two rows each, as what
+/// comes by an event timer on a bus with other frames.
 const EVEN: f64 = 0.1;
+const UNEVEN: f64 = 0.6;
+/// Rows over which it is looked which way a shaft turns.
+const TURNS_OVER: usize = 20;
 
 /// What was found in a capture. Torques and inertia are those at the shaft whose angle it has.
 #[derive(Clone, Debug, Serialize)]
@@ -81,7 +87,7 @@ pub struct CaptureReport {
 }
 
 /// Counts in a turn of a model's shaft as it is delivered; `None` where its table does not say that.
-pub fn delivered_counts(model: &Description) -> Option<f64> {
+fn delivered_counts(model: &Description) -> Option<f64> {
     match model.axes.first()?.units.counts_per_turn {
         CountsPerTurn::Fixed(counts) => Some(f64::from(counts)),
         CountsPerTurn::Object { object, factor } => match model.row(object)?.default {
@@ -93,16 +99,27 @@ pub fn delivered_counts(model: &Description) -> Option<f64> {
     }
 }
 
-/// What a capture shows of its drive; `torque_constant_nm_a` is the torque per ampere of its motor, `counts_per_turn` what a turn of its
-/// shaft has, where the capture counts.
+/// Torque per ampere at a model's shaft with the motor that it is delivered with; `None` where a reducer is between, or a maker says what
+/// its objects are worth.
+fn delivered_constant(model: &'static Description) -> Option<f64> {
+    let loops = model.axes.first()?.loops.as_ref().filter(|loops| loops.demand.is_some())?;
+    is_built_in(model).then(|| motor_of(model)).flatten().map(|motor| constant_of((model, loops), &motor, None))
+}
+
+/// What a capture shows of its drive. `torque_constant_nm_a` is the torque per ampere of its motor; where none is given, that of the
+/// motor that `model` is delivered with is taken, and what a turn has where the capture counts. Without `model` it is the one that the
+/// capture names.
 ///
 /// # Errors
 /// What it lacks, that its rows are not evenly spaced, and why nothing can be said of them.
 pub fn of_capture(
     capture: &Capture,
     torque_constant_nm_a: Option<f64>,
-    counts_per_turn: Option<f64>,
+    model: Option<&'static Description>,
 ) -> Result<CaptureReport, Failure> {
+    let of_file = devices::model(&capture.model);
+    let known = model.or(of_file);
+    let counts_per_turn = known.and_then(delivered_counts);
     let failed = |reason: &dyn std::fmt::Display| {
         Failure::new(format!("nothing can be found from the capture of node {}", capture.place)).because(reason)
     };
@@ -114,15 +131,29 @@ pub fn of_capture(
     if capture.is_cut_off {
         notes.push("the end of the file is missing: what is there was used".to_owned());
     }
+    if turns_both_ways(&samples) {
+        let note = "the shaft turned both ways, which shows its dry friction as inertia and viscous friction: a motion one way shows them better";
+        notes.push(note.to_owned());
+    }
     let response = tune::response(&samples, None).map_err(|error| failed(&error))?;
     let found = tune::identify(&response).map_err(|error| failed(&error))?;
     let own = (!samples.set_point_rad_s.is_empty()).then(|| tune::identify_loop(&response, &found, 0.0).ok()).flatten();
     if own.is_none() {
         notes.push(
-            "without the set-point noise in the loop biases the response: capture velocity_demand too".to_owned(),
+            "without the set-point noise in the loop biases the response: capture velocity_demand too, or target_velocity".to_owned(),
         );
     }
-    let inertia_kg_m2 = torque_constant_nm_a.map(|constant| found.inertia_kg_m2(constant));
+    if let Some((of_file, model)) = of_file.zip(model).filter(|(of_file, model)| of_file.name != model.name) {
+        notes.push(format!(
+            "it was captured of a {}, and node {} is a {}",
+            of_file.name, capture.place.node, model.name
+        ));
+    }
+    let of_model = known.filter(|_| torque_constant_nm_a.is_none()).and_then(delivered_constant);
+    if let Some(constant) = of_model {
+        notes.push(format!("its motor is taken to have {constant:.3} N·m/A, as the model is delivered"));
+    }
+    let inertia_kg_m2 = torque_constant_nm_a.or(of_model).map(|constant| found.inertia_kg_m2(constant));
     if inertia_kg_m2.is_none() {
         notes.push("the inertia takes the torque per ampere of its motor: --torque-constant".to_owned());
     }
@@ -220,14 +251,21 @@ impl<'a> UsedTraces<'a> {
         let stretches = rows.chunk_by(|a, b| capture.time_s[*b] - capture.time_s[*a] < GAP * period_s);
         let used = stretches.max_by_key(|stretch| stretch.len()).unwrap_or_default();
         let off = used.windows(2).map(|pair| (distance(pair) - period_s).abs()).fold(0.0, f64::max);
-        if off > EVEN * period_s {
-            let (off, period) = (off * 1e3, period_s * 1e3);
+        let (off_ms, period_ms) = (off * 1e3, period_s * 1e3);
+        if off > UNEVEN * period_s {
             return Err(format!(
-                "its rows are not evenly spaced: {period:.3} ms apart, and {off:.3} ms more or less; capture by SYNC, --rate 1ms"
+                "its rows are not evenly spaced: {period_ms:.3} ms apart, and {off_ms:.3} ms more or less; capture by SYNC, --rate 1ms"
             ));
         }
+        let is_even = off <= EVEN * period_s;
+        let times: Vec<f64> = used.iter().map(|row| capture.time_s[*row]).collect();
+        let [first, .., last] = times[..] else { return Err("it has too few rows".to_owned()) };
+        let period_s = if is_even { period_s } else { (last - first) / (times.len() - 1) as f64 };
         let mut samples = Samples { period_s, ..Samples::default() };
-        let values = |(trace, worth): (&Trace, f64)| used.iter().map(|row| trace.values[*row] * worth).collect();
+        let values = |(trace, worth): (&Trace, f64)| {
+            let all: Vec<f64> = used.iter().map(|row| trace.values[*row] * worth).collect();
+            if is_even { all } else { at_equal_times(&times, &all) }
+        };
         samples.current_a = values(self.current);
         samples.position_rad = values(self.motion);
         if !self.is_angle {
@@ -241,9 +279,38 @@ impl<'a> UsedTraces<'a> {
         }
         samples.set_point_rad_s = self.set_point.map(values).unwrap_or_default();
         let left = capture.time_s.len() - used.len();
-        let note = format!("{} of {} rows were used: the longest stretch without a gap", used.len(), used.len() + left);
-        Ok((samples, (left > 0).then_some(note).into_iter().collect()))
+        let gaps = format!("{} of {} rows were used: the longest stretch without a gap", used.len(), used.len() + left);
+        let uneven = format!(
+            "its rows are {period_ms:.3} ms apart, and {off_ms:.3} ms more or less: they were read at equal times"
+        );
+        let notes = [(left > 0, gaps), (!is_even, uneven)].into_iter().filter(|(is_so, _)| *is_so);
+        Ok((samples, notes.map(|(_, note)| note).collect()))
     }
+}
+
+/// More than a twentieth of its way is to each side.
+fn turns_both_ways(samples: &Samples) -> bool {
+    // Over so many rows the counts of an encoder do not matter.
+    let ways = samples.position_rad.windows(TURNS_OVER).step_by(TURNS_OVER).map(|rows| rows[TURNS_OVER - 1] - rows[0]);
+    let (forward, back): (Vec<f64>, Vec<f64>) = ways.partition(|way| *way > 0.0);
+    let [forward, back] = [forward, back].map(|ways| ways.into_iter().sum::<f64>().abs());
+    forward.min(back) > 0.05 * (forward + back)
+}
+
+/// Values on straight lines between these times, as many and equally far apart from the first to the last.
+fn at_equal_times(times: &[f64], values: &[f64]) -> Vec<f64> {
+    let (first, last) = (times[0], times[times.len() - 1]);
+    let mut before = 0;
+    let at = |row: usize| first + (last - first) * row as f64 / (times.len() - 1) as f64;
+    let value = |row: usize| {
+        let time = at(row);
+        while before + 2 < times.len() && times[before + 1] < time {
+            before += 1;
+        }
+        let share = (time - times[before]) / (times[before + 1] - times[before]);
+        values[before] + share * (values[before + 1] - values[before])
+    };
+    (0..times.len()).map(value).collect()
 }
 
 fn picture(capture: &Capture, response: &Response, found: &Mechanics) -> Poster {

@@ -37,6 +37,21 @@ pub struct Order {
 }
 
 impl Order {
+    /// A phase margin of 40° for the speed loop, with what is usual of all else.
+    pub(super) fn usual() -> Self {
+        let Bounds { current_a, travel_turns, .. } = Bounds::default();
+        Self {
+            bandwidth_hz: None,
+            phase_margin_deg: 40.0,
+            position: false,
+            speed_rpm: None,
+            current_a,
+            travel_turns,
+            period_ms: 1.0,
+            torque_constant_nm_a: None,
+        }
+    }
+
     /// The request, with this usual speed.
     ///
     /// # Errors

@@ -128,6 +128,18 @@ fn a_bandwidth_that_was_asked_for_is_had_on_the_plant() {
     let proposed = Proposed::of(&found, &setup, model, (Objective::Bandwidth(12.0), f64::INFINITY), false).unwrap();
     assert!(relative(proposed.before.crossover_hz, 12.0) > 0.2, "{proposed:?}");
     assert!(relative(proposed.after.crossover_hz, 12.0) < 0.1, "{proposed:?}");
+    // Of a load so many times as heavy what would be needed is beyond what 201Dh takes (0 to 30000: quick start guide V1.00, chapter 9), and
+    // less is proposed, which is said; or within it.
+    let heavier = |times: f64| {
+        let mut heavy = found.clone();
+        heavy.plant.gain /= times;
+        Proposed::of(&heavy, &setup, model, (Objective::Bandwidth(12.0), f64::INFINITY), false).unwrap()
+    };
+    let limited = heavier(200.0);
+    assert!(limited.is_limited && (1..=30_000).contains(&limited.gains[0].after), "{limited:?}");
+    assert!(limited.after.crossover_hz < 6.0, "{limited:?}");
+    let taken = heavier(10.0);
+    assert!(!taken.is_limited && (5 * proposed.gains[0].after..=30_000).contains(&taken.gains[0].after), "{taken:?}");
     let write = async {
         setup.put_back(&drive).await.unwrap();
         for gain in &proposed.gains {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use host::capture::{Restorer, record_of_log};
-use host::tune::{Bounds, Excursion, Setup, Twin, delivered_counts, loops_of, measure, motor_of, of_capture};
+use host::tune::{Bounds, Excursion, Setup, Twin, loops_of, measure, motor_of, of_capture};
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use master::decode::Decoder;
@@ -153,8 +153,7 @@ fn a_log_of_frames_shows_the_inertia_and_the_speed_loop_too() {
     let frames = std::mem::take(&mut *log.0.lock().unwrap());
     let capture = Capture::of(&record_of_log(decoder, frames).unwrap(), None).unwrap();
     let motor = motor_of(model).unwrap();
-    let constant = motor.windings.torque_constant_nm_a();
-    let report = of_capture(&capture, Some(constant), delivered_counts(model)).unwrap();
+    let report = of_capture(&capture, None, Some(model)).unwrap();
     assert_eq!(report.quantities, ["torque_demand", "position_actual_value_counts", "sent_target_velocity_rpm"]);
     let inertia = report.inertia_kg_m2.unwrap();
     let truth = motor.rotor.inertia_kg_m2 + LOAD_KG_M2;
@@ -184,7 +183,7 @@ fn what_a_capture_lacks_is_said_with_what_would_do() {
     );
     says(|it| drop(it.traces.remove(1)), "it has no motion: position_deg or velocity_rpm");
     says(|it| it.traces[0].values.fill(f64::NAN), "no three rows have all of");
-    says(|it| it.time_s.iter_mut().step_by(2).for_each(|at| *at += 0.3e-3), "not evenly spaced: ");
+    says(|it| it.time_s.iter_mut().step_by(2).for_each(|at| *at += 0.7e-3), "not evenly spaced: ");
     says(|it| it.traces[1].values.fill(7.0), "the position does not change");
     says(
         |it| {
@@ -193,6 +192,21 @@ fn what_a_capture_lacks_is_said_with_what_would_do() {
         },
         "100 samples are too few",
     );
+    // Each row a while before or after its time, with the values that it has then: read between them.
+    let mut uneven = capture.clone();
+    let late = |row: usize| 0.2e-3 * f64::sin(row as f64);
+    for trace in &mut uneven.traces {
+        let even = trace.values.clone();
+        for (row, value) in trace.values.iter_mut().enumerate().skip(1).take(even.len() - 2) {
+            let (share, next) = (late(row) / 1e-3, if late(row) > 0.0 { row + 1 } else { row - 1 });
+            *value += share.abs() * (even[next] - even[row]);
+        }
+    }
+    uneven.time_s.iter_mut().enumerate().skip(1).for_each(|(row, at)| *at += late(row));
+    let [report, other] = [&capture, &uneven].map(|of| of_capture(of, Some(1.0), None).unwrap());
+    let [inertia, same] = [&other, &report].map(|found| found.inertia_kg_m2.unwrap());
+    assert!((inertia / same - 1.0).abs() < 0.03, "{inertia}, evenly {same}");
+    assert!(other.notes.iter().any(|note| note.contains("read at equal times")), "{other:?}");
     // A gap: the longer part of it, which is said.
     let mut gap = capture.clone();
     let at = gap.time_s.len() / 10;

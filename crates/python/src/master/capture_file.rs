@@ -102,7 +102,7 @@ fn kind_of(path: &Path) -> Result<Kind, Failure> {
 fn loaded(path: &Path, node: Option<u8>) -> Result<Capture, Failure> {
     let kind = kind_of(path)?;
     let recorded = read_bytes(path, LARGEST).and_then(|bytes| read(kind, &bytes));
-    recorded.and_then(|recorded| Capture::of(&recorded, node.map(Place::node))).map_err(|reason| {
+    recorded.and_then(|recorded| Capture::of_node(&recorded, node)).map_err(|reason| {
         Failure::bad_file(format!("{} cannot be read as a capture", path.display()))
             .because(reason)
             .next("give a capture or a record of one node, or name which: node=4")

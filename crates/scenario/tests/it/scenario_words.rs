@@ -290,6 +290,49 @@ fn parameters_of_a_file_are_written_checked_and_kept() {
     assert!(outcome.passed(), "{:#?}", outcome.rows);
 }
 
+/// What a person measured in the studio is measured again; the shaft has its speed while a capture shows it, and no power after a test motion.
+#[test]
+fn captures_and_test_motions_measure_a_drive_and_put_its_pdos_back() {
+    let outcome = run(
+        "[[host]]\ndo = [{ do = '4 read 1A03:00', is = 0 }, '4 velocity 30rpm', '4 capture velocity 606C for 200ms rate 2ms', '4 stop', \
+         '4 test-motion steps speed 60rpm time 500ms count 2', '4 test-motion sine by 10deg frequency 2 periods 1', \
+         { do = '4 capture mass for 1s', fails = 'mass' }, { do = '4 test-motion steps speed 20rpm time 5s travel 0.5', fails = 'turns from where it stood' }, \
+         { do = '4 read 1A03:00', is = 0 }]\n[[expect]]\nafter = 'host'\nthat = '4 velocity = 0 +- 0.5 and 4 state switch-on-disabled'\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let (_, seen) = row(&outcome, "4 capture velocity");
+    let shown: Vec<&str> = seen.split("; ").collect();
+    assert!(shown[0] == "101 rows" || shown[0] == "100 rows", "{seen}");
+    for of in &shown[1..] {
+        let values: Vec<f64> = of.split(' ').filter_map(|word| word.parse().ok()).collect();
+        assert!(matches!(values[..], [low, high] if low > 28.0 && high < 32.0), "{seen}");
+    }
+    assert!(shown.len() == 3 && shown[1].starts_with("velocity_rpm "), "{seen}");
+    let (_, seen) = row(&outcome, "4 test-motion steps speed 60rpm");
+    assert!(seen.contains("rise, 0 to 60 r/min") && seen.contains("; run 2: rise, 0 to 60 r/min"), "{seen}");
+    let (_, seen) = row(&outcome, "4 test-motion sine");
+    assert!(seen.starts_with("run 1: following error"), "{seen}");
+}
+
+/// 0.03 kg m² at the shaft, and the rotor: within 5 %. The drive has the gains then that its row names (201Dh).
+#[test]
+fn gains_are_found_for_a_drive_and_tried() {
+    let outcome = run(
+        "[[step]]\nat = '0s'\ndo = '4 load inertia 0.03'\n[[host]]\ndo = ['4 tune speed 60rpm apply', '4 read 201D']\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+    let (_, seen) = row(&outcome, "4 tune");
+    let rotor = host::tune::motor_of(devices::model("zlac8030l").unwrap()).unwrap().rotor.inertia_kg_m2;
+    let found: f64 = seen.split(' ').nth(1).and_then(|word| word.parse().ok()).unwrap_or(f64::NAN);
+    assert!((found / (rotor + 0.03) - 1.0).abs() < 0.05, "{seen}");
+    let (_, read) = row(&outcome, "4 read 201D");
+    let gain = read.split(' ').next().unwrap();
+    assert!(
+        seen.ends_with("tried on the drive, which has them") && seen.contains(&format!("201Dh:00 500 -> {gain};")),
+        "{seen}: {read}"
+    );
+}
+
 #[test]
 fn a_base_a_node_and_a_file_that_are_not_there_are_refused_before_the_run() {
     for (line, said) in [

@@ -7,10 +7,10 @@ use std::time::Duration;
 use canopen::NodeId;
 use host::network::params::journal::default_path;
 use host::tune::{Bounds, CaptureReport, MoveRow, RampReport, RampRequest, Request, TuneReport};
+use machine::group_move::turns;
 use master::decode::Decoder;
-use master::units::{Amperes, Angle, Rpm, parse_duration};
+use master::units::{Amperes, Rpm, parse_duration};
 use recording::Capture;
-use sim::Place;
 use words::node::node;
 
 use super::params::journal::note_kept;
@@ -136,15 +136,6 @@ fn without_effect(options: &[(&str, bool)], on: &str, why: &str) -> Result<(), F
     }
 }
 
-/// An angle in turns, which a number alone is too.
-fn turns(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>().map_or_else(|_| text.parse(), |turns| Ok(Angle::Turns(turns))) {
-        Ok(Angle::Turns(turns)) => Ok(turns),
-        Ok(Angle::Counts(_)) => Err("expected an angle in turns or degrees, e.g. 20turn or 90deg".into()),
-        Err(error) => Err(error.to_string()),
-    }
-}
-
 impl Tune {
     fn request(&self, journal: Option<PathBuf>, (usual_rpm, usual_a): (f64, f64)) -> Request {
         let objective =
@@ -261,13 +252,8 @@ impl Tune {
         context.named_models().for_each(|(node, model)| decoder.set_model(node, model));
         let recorded = read_record(path, decoder)?;
         let model = context.named_models().find(|(node, _)| *node == self.node).map(|(_, model)| model);
-        let known = model.map(|model| model.name);
-        let capture = Capture::of(&recorded, Some(Place::node(self.node.raw()))).map_err(unread)?;
-        let mut report =
-            host::tune::of_capture(&capture, self.torque_constant, model.and_then(host::tune::delivered_counts))?;
-        if let Some(model) = known.filter(|model| !capture.model.is_empty() && capture.model != *model) {
-            report.notes.push(format!("it was captured of a {}, and node {} is a {model}", capture.model, self.node));
-        }
+        let capture = Capture::of_node(&recorded, Some(self.node.raw())).map_err(unread)?;
+        let report = host::tune::of_capture(&capture, self.torque_constant, model)?;
         let picture = self.draw(&report.picture)?;
         Ok(Tuned { found: TuneResult::Captured(Box::new(report)), picture })
     }
