@@ -1,7 +1,7 @@
 // What a fast capture asks of the studio, and what it makes of the answer. Independent of the page.
 
 import { number } from "./dom.js";
-import { QUANTITIES } from "./quantities.js";
+import { QUANTITIES, fieldOf } from "./quantities.js";
 
 /** Times between two readings that are offered, in ms. */
 export const PERIODS_MS = [0.5, 1, 2, 5, 10, 20, 50, 100];
@@ -24,22 +24,19 @@ export function timesIn(text, most) {
 }
 
 /** The command of a capture, from what the fields have; throws what is wrong with it. */
-export function orderOf(node, { chosen, more, period_ms, duration_s, trigger, pre_ms, sdo }) {
+export function orderOf(node, { chosen, more, period_ms, duration_s, trigger, pre_ms, take, sdo }) {
   const quantities = [...new Set([...chosen, ...namesIn(more)])];
   if (!quantities.length) throw new Error("choose a quantity first, such as velocity");
   const duration_ms = numberIn(duration_s, "a time in s") * 1e3;
   if (!(duration_ms > 0)) throw new Error(`expected a time above 0 s, got ${duration_s}`);
   const when = trigger.trim() === "" ? null : trigger.trim();
   const before_ms = when && pre_ms.trim() !== "" ? numberIn(pre_ms, "a time before the trigger in ms") : 0;
-  return { do: "capture", node, quantities, period_ms: Number(period_ms), duration_ms, trigger: when, pre_ms: before_ms, sdo };
+  return { do: "capture", node, quantities, period_ms: Number(period_ms), duration_ms, trigger: when, pre_ms: before_ms, take: namesIn(take), sdo };
 }
-
-/** Values that the studio reads under another name: they stand in one pane with them. */
-const ALIASES = { position_deg: "angle_degrees" };
 
 /** A column of the scope from a trace of the answer. */
 function columnOf({ quantity, unit, values }, node, at) {
-  const field = ALIASES[quantity] ?? quantity;
+  const field = fieldOf(quantity);
   const known = QUANTITIES.find((one) => one.field === field);
   const has = values.flatMap((value, row) => (value === null ? [] : [row]));
   return {

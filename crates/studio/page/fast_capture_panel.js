@@ -25,6 +25,7 @@ export function fastCapturePanel(shared, { taken }) {
   const trigger = field("fast-trigger", "Begin when a quantity passes a value: velocity>10 rising, velocity<10 falling; at once without one", String(before.trigger ?? ""), { size: "18", placeholder: "at once, or velocity>10" });
   const pre = field("fast-pre", "Kept of before the trigger, in ms", String(before.pre_ms ?? "0"), { class: "short", inputmode: "decimal" });
   const times = field("fast-times", "How often: armed again after each, and each is kept", String(before.times ?? "1"), { class: "short", inputmode: "numeric" });
+  const take = field("fast-take", "TPDOs to use although they are in use: tpdo1; who listens to them misses them meanwhile", String(before.take ?? ""), { size: "8", placeholder: "tpdo1, …" });
   const sdo = toggle("fast-sdo", "SDO for the rest", before.sdo === true, store, { title: "Read by SDO what has no room in a TPDO: slower, and at times of its own (--sdo)" });
   const begin = h("button", { type: "button", id: "fast-begin", class: "primary", onclick: capture }, "Capture");
   const end = h("button", { type: "button", id: "fast-end", hidden: true, onclick: endIt }, "End now");
@@ -36,7 +37,7 @@ export function fastCapturePanel(shared, { taken }) {
     h("summary", {}, "Fast capture"),
     h("div", { class: "bar" }, quantities),
     h("div", { class: "bar" }, more, truths),
-    h("div", { class: "bar" }, period, h("label", {}, "for ", duration, " s"), h("label", {}, "from ", trigger), h("label", {}, "with ", pre, " ms before it"), h("label", {}, times, " times"), sdo),
+    h("div", { class: "bar" }, period, h("label", {}, "for ", duration, " s"), h("label", {}, "from ", trigger), h("label", {}, "with ", pre, " ms before it"), h("label", {}, times, " times"), sdo, h("label", {}, "taking ", take)),
     h("div", { class: "bar" }, begin, end),
     status,
     had,
@@ -50,7 +51,7 @@ export function fastCapturePanel(shared, { taken }) {
   let offered = null;
 
   function store() {
-    keep(SETTINGS, { chosen: [...chosen], more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, times: times.value, sdo: sdo.checked });
+    keep(SETTINGS, { chosen: [...chosen], more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, times: times.value, take: take.value, sdo: sdo.checked });
   }
 
   function addTrue() {
@@ -99,7 +100,7 @@ export function fastCapturePanel(shared, { taken }) {
     try {
       count = timesIn(times.value, MOST_KEPT);
       if (!inControl()) throw new Error("Take control first: the drive's TPDOs are mapped for it.");
-      order = orderOf(node, { chosen: chosenHere(), more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, sdo: sdo.checked });
+      order = orderOf(node, { chosen: chosenHere(), more: more.value, period_ms: period.value, duration_s: duration.value, trigger: trigger.value, pre_ms: pre.value, take: take.value, sdo: sdo.checked });
     } catch (error) {
       return say(error.message, true);
     }

@@ -9,3 +9,11 @@ export const QUANTITIES = [
   { field: "position_counts", label: "Counts", unit: "counts", decimals: 0 },
   { field: "statusword", label: "Statusword", unit: "", decimals: 0, steps: false },
 ];
+
+/** The names that such values have in records and captures, where these are others. */
+const RECORDED = { angle_degrees: "position_deg" };
+const FIELDS = Object.fromEntries(Object.entries(RECORDED).map(([field, name]) => [name, field]));
+
+/** What a value is called in a record, and which value such a name means. */
+export const recordedName = (field) => RECORDED[field] ?? field;
+export const fieldOf = (name) => FIELDS[name] ?? name;

@@ -1,13 +1,13 @@
 // Records and logs as captures, and captures as records. The studio reads the files; the forms are those of the command line.
 
-import { QUANTITIES } from "./quantities.js";
+import { QUANTITIES, fieldOf, recordedName } from "./quantities.js";
 import { request } from "./transport.js";
 
 /** `4.velocity_rpm`, `4.606C_00`: what a column is called in a record. */
 export function titleOf({ node, field }) {
   // A column of a file that names no node keeps its name.
   if (node === null) return field;
-  return `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : field}`;
+  return `${node}.${field.includes(":") ? field.split(":").slice(1).join("_") : recordedName(field)}`;
 }
 
 /** The field and the node of a column of a record. */
@@ -15,7 +15,7 @@ export function placeOf(title) {
   const [, node, axis, name] = /^(?:(\d+)(?:\.(\d+))?\.)?(.*)$/.exec(title);
   const object = /^([0-9A-F]{4})_([0-9A-F]{2})$/i.exec(name);
   if (node === undefined || axis !== undefined) return { node: null, field: title };
-  return { node: Number(node), field: object ? `${node}:${object[1].toUpperCase()}:${object[2].toUpperCase()}` : name };
+  return { node: Number(node), field: object ? `${node}:${object[1].toUpperCase()}:${object[2].toUpperCase()}` : fieldOf(name) };
 }
 
 /** How the mark of a record begins that says what the capture is: the form of `ferrodrive capture` (crate recording). */
@@ -74,11 +74,25 @@ async function posted(path, body) {
   throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio does not answer");
 }
 
+/** The files of logs that were read, by the ids of their captures: these have what frames carry, a log has when they were sampled. */
+const logs = new Map();
+
+/** What a capture shows of a drive: frequency response, masses, speed loop. `node` is taken where it has several. Throws what it lacks. */
+export async function identified(capture, node) {
+  const nodes = new Set(capture.columns.map((column) => column.node));
+  const log = logs.get(capture.id);
+  const name = log?.name ?? "capture.csv";
+  const query = new URLSearchParams({ name, ...(nodes.has(node) ? { node } : {}) });
+  return (await posted(`/api/recording/identified?${query}`, log ?? recordOf({ columns: capture.columns, marks: [], about: capture }))).json();
+}
+
 /** Reads a record or a log: `{ capture, remark }`. Throws what is wrong with it. */
 export async function readRecording(file) {
   const body = await (await posted(`/api/recording?${new URLSearchParams({ name: file.name })}`, file)).json();
   if (!body.columns.length) throw new Error(`${file.name} has no values${body.remark ? `: ${body.remark}` : ""}`);
-  return { capture: captureOf(file.name, body), remark: body.remark };
+  const capture = captureOf(file.name, body);
+  if (!/\.(csv|mcap)$/i.test(file.name)) logs.set(capture.id, file);
+  return { capture, remark: body.remark };
 }
 
 /** The text of a record as MCAP, which Foxglove, PlotJuggler and Rerun open. */

@@ -76,7 +76,7 @@ export function scopeView(shared, report) {
   const keeps = toggle("trigger-keep", "Keep each", false, () => {}, { title: "Keep a capture whenever the trigger fires" });
   const saved = h("p", { class: "bad", role: "status" });
   const computed = computedPanel();
-  const captures = capturePanel({ take: shownCapture, open: openCapture });
+  const captures = capturePanel(shared, { take: shownCapture, open: openCapture });
   const fast = fastCapturePanel(shared, { taken(capture) {
     captures.keep(capture);
     openCapture(capture);

@@ -4,13 +4,15 @@ import { ALIGNMENTS, freeName } from "./capture.js";
 import { captures, deleteCapture, keepCapture, loadCaptures, storeCapture } from "./capture_store.js";
 import { choice } from "./choice.js";
 import { count, h, setText, toggle } from "./dom.js";
+import { identifiedPanel } from "./identified_panel.js";
 import { readRecording } from "./recordings.js";
 
 const LONGEST_NAME = 60;
 const LONGEST_NOTES = 2000;
 
 /** `take` gives a capture of what is shown, or null; `open` shows one by itself. */
-export function capturePanel({ take, open }) {
+export function capturePanel(shared, { take, open }) {
+  const found = identifiedPanel(shared);
   const status = h("span", { role: "status", id: "capture-status" });
   const file = h("input", { type: "file", id: "capture-file", class: "unseen-input", accept: ".mcap,.csv,.log,.candump,.txt,.blf,.asc,.trc,.pcap,.pcapng", "aria-label": "A record or a log to load", onchange: load });
   const align = choice("capture-align", "Lay over", ALIGNMENTS, { value: "zero" });
@@ -30,6 +32,7 @@ export function capturePanel({ take, open }) {
       status,
     ),
     list,
+    found.root,
   );
   /** The ids of the captures that are laid over the picture. */
   const over = new Set();
@@ -105,6 +108,7 @@ export function capturePanel({ take, open }) {
       notes,
       h("label", {}, "by ", shift, " s"),
       h("button", { type: "button", "aria-label": `Show ${capture.name} by itself`, onclick: () => open(capture) }, "Show"),
+      h("button", { type: "button", title: "Frequency response, masses and speed loop by demanded current, motion and set-point; nothing moves", "aria-label": `Identify the drive from ${capture.name}`, onclick: () => found.show(capture) }, "Identify"),
       h("button", { type: "button", "aria-label": `Delete ${capture.name}`, onclick: remove }, "Delete"),
       h("span", { class: "quiet" }, `${capture.taken.slice(0, 19).replace("T", " ")}, ${capture.columns.length} values`),
     );

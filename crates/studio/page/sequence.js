@@ -142,7 +142,7 @@ const ROWS = {
     python: (command) => [LEFT_OUT(`node ${command.node}: ${ROWS.write_pdos.shown(command)}`)],
   },
   nmt: { shown: ({ command }) => `NMT ${command}`, line: ({ command }) => `nmt ${command}`, cli: ({ node, command }) => `nmt ${node} ${command}`, python: ({ node, command }) => [`network.nmt(${JSON.stringify(command)}, ${node})`] },
-  store: { shown: () => "Store the parameters", line: ({ node }) => LEFT_OUT(`node ${node}: store the parameters`), cli: ({ node }) => `save ${node}`, python: () => "save()" },
+  store: { shown: () => "Store the parameters", line: () => "save", cli: ({ node }) => `save ${node}`, python: () => "save()" },
   write_parameters: {
     shown: ({ values }) => `Write ${values.map(({ object, value }) => `${object} = ${value}`).join(", ")}`,
     line: ({ values }) => values.map(({ object, value }) => `write ${objectOf(object)} ${value}`),
@@ -151,19 +151,24 @@ const ROWS = {
   },
   capture: {
     shown: ({ quantities, period_ms, duration_ms, trigger }) => `Capture ${quantities.join(", ")} every ${ms(period_ms)} for ${figure(duration_ms / 1e3)} s${trigger ? ` from ${trigger}` : ""}`,
-    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.capture.shown(command)}`),
-    cli: ({ node, quantities, period_ms, duration_ms, trigger, pre_ms, sdo }) => `capture ${node} ${quantities.join(" ")} --for ${ms(duration_ms)} --rate ${ms(period_ms)}${trigger ? ` --trigger ${quoted(trigger)}${pre_ms ? ` --pre ${ms(pre_ms)}` : ""}` : ""}${sdo ? " --sdo" : ""} -o node${node}.mcap  # waits for its end`,
-    python: ({ quantities, period_ms, duration_ms, trigger, pre_ms, sdo }) => `capture(${quantities.map((name) => JSON.stringify(name)).join(", ")}, duration=${figure(duration_ms / 1e3)}, period=${figure(period_ms / 1e3)}${trigger ? `, trigger=${JSON.stringify(trigger)}${pre_ms ? `, pre_trigger=${figure(pre_ms / 1e3)}` : ""}` : ""}${sdo ? ", sdo=True" : ""})  # waits for its end`,
+    line: ({ quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture ${quantities.join(" ")} rate ${ms(period_ms)}${trigger ? ` trigger ${trigger.replaceAll(" ", "")}${pre_ms ? ` pre ${ms(pre_ms)}` : ""}` : ""}${take.map((pdo) => ` take ${pdo}`).join("")}${sdo ? " sdo" : ""} for ${ms(duration_ms)}`,
+    cli: ({ node, quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture ${node} ${quantities.join(" ")} --for ${ms(duration_ms)} --rate ${ms(period_ms)}${trigger ? ` --trigger ${quoted(trigger)}${pre_ms ? ` --pre ${ms(pre_ms)}` : ""}` : ""}${take.map((pdo) => ` --take ${pdo}`).join("")}${sdo ? " --sdo" : ""} -o node${node}.mcap  # waits for its end`,
+    python: ({ quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture(${quantities.map((name) => JSON.stringify(name)).join(", ")}, duration=${figure(duration_ms / 1e3)}, period=${figure(period_ms / 1e3)}${trigger ? `, trigger=${JSON.stringify(trigger)}${pre_ms ? `, pre_trigger=${figure(pre_ms / 1e3)}` : ""}` : ""}${take.length ? `, take=${JSON.stringify(take)}` : ""}${sdo ? ", sdo=True" : ""})  # waits for its end`,
   },
   test_motion: {
     shown: ({ motion }) => `Test motion ${motion.shape}, ${motion.count} ${motion.count === 1 ? "run" : "runs"}`,
-    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.test_motion.shown(command)}`),
-    cli: ({ node, ...order }) => (order.motion.shape === "path" ? [LEFT_OUT(`node ${node}: a test motion along a path of ${order.motion.path.length} points; with a capture: ferrodrive test-motion ${node} path --path FILE`)] : `test-motion ${node} ${order.motion.shape} ${testMotionOptions(/** @type {any} */ (order)).map(([name, value]) => `--${name} ${value}`).join(" ")}`),
+    line: ({ node, ...order }) => (order.motion.shape === "path" ? LEFT_OUT(`node ${node}: a test motion along a path of ${order.motion.path.length} points`) : `test-motion ${order.motion.shape} ${testMotionOptions(/** @type {any} */ (order)).flat().join(" ")}`),
+    cli: ({ node, ...order }) => {
+      const options = testMotionOptions(/** @type {any} */ (order)).map(([name, value]) => ` --${name} ${value}`).join("");
+      if (order.motion.shape !== "path") return `test-motion ${node} ${order.motion.shape}${options}`;
+      const points = order.motion.path.map(([at_s, deg]) => `${figure(at_s)},${figure(deg)},`);
+      return [`cat > path${node}.csv <<'END'`, `t_s,${node}.position_deg,mark`, ...points, "END", `ferrodrive test-motion ${node} path --path path${node}.csv${options}`];
+    },
     python: (order) => `test_motion(${testMotionArguments(order)})`,
   },
   tune: {
     shown: ({ bandwidth_hz, phase_margin_deg, position, speed_rpm, current_a, travel_turns }) => `Find gains for ${bandwidth_hz === null ? `a phase margin of ${figure(phase_margin_deg)}°` : `a bandwidth of ${figure(bandwidth_hz)} Hz`}${position ? ", position too" : ""}; at most ${speed_rpm === null ? "its usual speed" : `${figure(speed_rpm)} r/min`}, ${figure(current_a)} A, ${figure(travel_turns)} turns`,
-    line: (command) => LEFT_OUT(`node ${command.node}: ${ROWS.tune.shown(command)}`),
+    line: (command) => `tune ${tuneOptions(command).map(({ option }) => option).join(" ")}`,
     cli: (command) => `tune ${command.node} ${tuneOptions(command).map(({ option }) => `--${option}`).join(" ")}  # waits for its end`,
     python: (command) => `tune(${tuneOptions(command).map(({ argument }) => argument).join(", ")})  # waits for its end`,
   },
@@ -205,7 +210,7 @@ const WHOLE = {
   group_move: ({ axes }) => Array.isArray(axes) && axes.length > 1 && axes.every((axis) => Number.isInteger(axis?.node) && typeof axis.degrees === "number"),
   ...HELD_WHOLE,
   write_pdos: ({ pdos }) => Array.isArray(pdos) && pdos.length > 0 && pdos.every(isPdo),
-  capture: ({ quantities, trigger }) => isNames(quantities) && (trigger === null || typeof trigger === "string"),
+  capture: ({ quantities, trigger, take = [] }) => isNames(quantities) && isNames(take) && (trigger === null || typeof trigger === "string"),
   tune: (command) => typeof command.position === "boolean" && TUNE_FIGURES.every((name) => isFigure(command[name])) && TUNE_CHOICES.every((name) => command[name] === null || isFigure(command[name])),
   test_motion: ({ motion, quantities }) => isNames(quantities) && SHAPES.some(({ value }) => value === motion?.shape) && Array.isArray(motion.path),
 };
@@ -349,7 +354,7 @@ export function scenario(steps, models) {
   const known = new Set(models.map(({ node }) => node));
   const isKnown = (command) => nodesOf(command).every((node) => known.has(node));
   const bases = [...new Set(steps.filter(({ command }) => command.do === "base_jog" && isKnown(command)).map(({ command }) => baseOf(command)))];
-  const lines = withTimes(steps, isReplaced).flatMap((step, at) => {
+  const lines = asSaid(steps).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     // Its machine has one base.
     const { command } = step;

@@ -60,9 +60,21 @@ const unknown = (command, models) => command.wheels.some((node) => !models.has(n
 export const HELD_ROWS = {
   group_jog: {
     shown: (command) => `Turn together at ${command.axes.map(({ rpm }) => figure(rpm)).join(", ")} r/min${time(command)}`,
-    line: unsaid,
-    cli: (command) => [unsaid(command)],
-    python: (command) => [unsaid(command)],
+    line: ({ axes, rpm_per_s: ramp, held_s }) => [
+      ...axes.map(({ node, rpm }) => `${node} velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`),
+      `wait ${ms(held_s * 1e3)}`,
+      ...axes.map(({ node }) => `${node} stop`),
+    ],
+    cli: ({ axes, rpm_per_s: ramp, held_s }) => [
+      ...axes.map(({ node, rpm }) => `ferrodrive velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} --no-wait`),
+      `sleep ${figure(held_s)}`,
+      ...axes.map(({ node }) => `ferrodrive stop ${node}`),
+    ],
+    python: ({ axes, rpm_per_s: ramp, held_s }) => [
+      ...axes.map(({ node, rpm }) => `node_${node}.velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`),
+      `network.sleep(${figure(held_s)})`,
+      ...axes.map(({ node }) => `node_${node}.stop()`),
+    ],
   },
   base_jog: {
     shown: (command) => `Drive the base at ${figure(command.linear_m_s)} m/s and ${figure(command.angular_rad_s)} rad/s${time(command)}`,

@@ -14,19 +14,24 @@ export const SHAPES = [
   { value: "path", text: "A recorded path", fields: ["path"], about: "The position of a capture that is kept here, from where the shaft stands." },
 ];
 
-/** Fields of a number: label, unit, usual value, and whether it may be left empty. */
+const [ANGLE, SPEED] = [{ field: "angle_degrees", unit: "°" }, { field: "velocity_rpm", unit: "r/min" }];
+
+/**
+ * Fields of a number: label, unit, usual value, and whether it may be left empty. One with a `quantity` is shown in the unit that is chosen for
+ * that, `rate` being its rate of change.
+ */
 export const FIELDS = {
-  by_deg: { label: "Amplitude", unit: "°", usual: "20" },
-  speed_rpm: { label: "Speed", unit: "r/min", usual: "60" },
+  by_deg: { label: "Amplitude", unit: "°", quantity: ANGLE, usual: "20" },
+  speed_rpm: { label: "Speed", unit: "r/min", quantity: SPEED, usual: "60" },
   frequency_hz: { label: "Frequency", unit: "Hz", usual: "1" },
   to_frequency_hz: { label: "to", unit: "Hz", usual: "5" },
   periods: { label: "Periods", unit: "", usual: "3" },
   time_s: { label: "Time", unit: "s", usual: "0.5" },
   count: { label: "Runs", unit: "", usual: "3" },
-  velocity_rpm: { label: "Speed at most", unit: "r/min", usual: "60" },
-  acceleration_rpm_s: { label: "Acceleration", unit: "r/min/s", usual: "", optional: true, title: "Empty: 600 r/min/s; for steps the drive's own ramps" },
+  velocity_rpm: { label: "Speed at most", unit: "r/min", quantity: SPEED, usual: "60" },
+  acceleration_rpm_s: { label: "Acceleration", unit: "r/min/s", quantity: SPEED, rate: true, usual: "", optional: true, title: "Empty: 600 r/min/s; for steps the drive's own ramps" },
   travel_turns: { label: "Travel at most", unit: "turns", usual: "", optional: true, title: "From where the shaft stands: farther points are refused, and steps are stopped. Empty: any" },
-  following_error_deg: { label: "Following error at most", unit: "°", usual: "72", title: "Beyond it points are stopped; steps have no set-point to follow" },
+  following_error_deg: { label: "Following error at most", unit: "°", quantity: ANGLE, usual: "72", title: "Beyond it points are stopped; steps have no set-point to follow" },
   period_ms: { label: "Points every", unit: "ms", usual: "10", title: "The period of SYNC; steps are sent by SDO" },
   capture_ms: { label: "Readings every", unit: "ms", usual: "", optional: true, title: "Empty: with each point, and every millisecond of steps" },
 };
@@ -55,6 +60,13 @@ export function pathOf({ columns }) {
   const at = Array.from(column.times.keys()).filter((row) => row % step === 0 || row === column.times.length - 1);
   const rounded = (value) => Math.round(value * 1e5) / 1e5;
   return at.map((row) => [rounded(column.times[row] - column.times[0]), rounded(column.values[row])]);
+}
+
+/** Of which other drive a path was captured, in a sentence; empty where it is this one's, or that is not known. */
+export function otherDrive({ columns, model = "" }, { node, model: own }) {
+  const of = columns.find(({ field }) => field === "angle_degrees")?.node ?? node;
+  if (of === node && (model === "" || model === own)) return "";
+  return `The path was captured of node ${of}${model ? ` (${model})` : ""}, and node ${node} (${own}) is moved along it.`;
 }
 
 /** The command of a test motion, from the texts of the fields; a field that the shape does not have keeps its usual value. Throws what is wrong. */

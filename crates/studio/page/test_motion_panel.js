@@ -6,21 +6,37 @@ import { h, setText, table } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
-import { FIELDS, LIMITS, MOST_KEPT, SHAPES, capturesOf, figureRows, orderOf, pathOf, remarkOf } from "./test_motion.js";
+import { FIELDS, LIMITS, MOST_KEPT, SHAPES, capturesOf, figureRows, orderOf, otherDrive, pathOf, remarkOf } from "./test_motion.js";
+import { unitField } from "./unit_field.js";
 
 const SETTINGS = "test-motion";
 const DOING = "test motion";
 const HEAD = ["Run", "What", "Figure"];
 
+/**
+ * A field in the unit that is chosen for its quantity, or with its own: `text` is in its own unit.
+ * @param {string} name
+ * @param {Record<string, any>} field
+ * @param {string} value
+ * @param {() => void} onchange
+ */
+function fieldOf(name, { label, unit, usual, title, quantity, rate, optional }, value, onchange) {
+  const id = `test-${name}`;
+  if (quantity) {
+    const { input, row, read, update } = unitField(id, label, quantity, value, { optional, rate });
+    Object.assign(input, { onchange, placeholder: usual === "" ? "–" : "" });
+    row.title = title ?? "";
+    return { row, update, text: () => (read() === null ? "" : String(read())) };
+  }
+  const input = h("input", { id, value, class: "short", inputmode: "decimal", spellcheck: "false", "aria-label": unit ? `${label} in ${unit}` : label, placeholder: usual === "" ? "–" : "", onchange });
+  return { row: h("label", { title: title ?? "" }, `${label} `, input, unit ? ` ${unit}` : ""), update: () => {}, text: () => input.value };
+}
+
 /** `taken` gets the captures of the runs when they are there, those to keep first; `open` shows one. */
 export function testMotionPanel(shared, report, { taken, open }) {
   const before = kept(SETTINGS, {});
   const texts = { ...before.texts };
-  const inputs = Object.fromEntries(Object.entries(FIELDS).map(([name, { label, unit, usual, title }]) => {
-    const input = h("input", { id: `test-${name}`, value: String(texts[name] ?? usual), class: "short", inputmode: "decimal", spellcheck: "false", "aria-label": unit ? `${label} in ${unit}` : label, placeholder: usual === "" ? "–" : "", onchange: store });
-    const row = h("label", { title: title ?? "" }, `${label} `, input, unit ? ` ${unit}` : "");
-    return [name, { input, row }];
-  }));
+  const inputs = Object.fromEntries(Object.entries(FIELDS).map(([name, field]) => [name, fieldOf(name, field, String(texts[name] ?? field.usual), store)]));
   const known = SHAPES.some(({ value }) => value === before.shape);
   const shape = choice("test-shape", "Shape", SHAPES, { value: known ? before.shape : "steps", onchange: () => (store(), show()) });
   const path = choice("test-path", "Capture whose position is the path", [], { onopen: offerPaths });
@@ -48,10 +64,13 @@ export function testMotionPanel(shared, report, { taken, open }) {
   );
   /** A run was asked for, and is not answered yet. */
   let busy = false;
+  /** The chosen drive, as the state has it. */
+  let drive = null;
+
+  const textsNow = () => Object.fromEntries(Object.entries(inputs).map(([name, { text }]) => [name, text()]));
 
   function store() {
-    const now = Object.fromEntries(Object.entries(inputs).map(([name, { input }]) => [name, input.value]));
-    keep(SETTINGS, { shape: shape.value, texts: now, quantities: quantities.value });
+    keep(SETTINGS, { shape: shape.value, texts: textsNow(), quantities: quantities.value });
   }
 
   /** Shows the fields of the shape. */
@@ -78,10 +97,11 @@ export function testMotionPanel(shared, report, { taken, open }) {
   async function run() {
     const node = shared.node;
     let order;
+    let other = "";
     try {
-      const now = Object.fromEntries(Object.entries(inputs).map(([name, { input }]) => [name, input.value]));
-      const along = captures.find(({ id }) => id === path.value);
-      order = orderOf(node, { shape: shape.value, texts: now, quantities: quantities.value, path: along ? pathOf(along) : null });
+      const along = shape.value === "path" ? captures.find(({ id }) => id === path.value) : null;
+      other = along ? otherDrive(along, drive) : "";
+      order = orderOf(node, { shape: shape.value, texts: textsNow(), quantities: quantities.value, path: along ? pathOf(along) : null });
     } catch (error) {
       return say(error.message, true);
     }
@@ -89,17 +109,17 @@ export function testMotionPanel(shared, report, { taken, open }) {
     busy = true;
     start.disabled = true;
     had.replaceChildren();
-    say(`Node ${node}: setting the capture up, then ${order.motion.count === 1 ? "1 run" : `${order.motion.count} runs`} …`);
+    say(`Node ${node}: setting the capture up, then ${order.motion.count === 1 ? "1 run" : `${order.motion.count} runs`} … ${other}`);
     const answer = await ask(order);
     busy = false;
     if (!answer.ok) return say(answer.error.message, true);
-    draw(node, answer.result);
+    draw(node, answer.result, other);
   }
 
-  function draw(node, result) {
+  function draw(node, result, other) {
     const made = capturesOf(result);
     const left = made.length > MOST_KEPT ? ` The first ${MOST_KEPT} runs are kept as captures.` : "";
-    say(`Node ${node}: ${remarkOf(result)}${left}`, result.lacks.length > 0);
+    say(`Node ${node}: ${remarkOf(result)}${left} ${other}`.trim(), result.lacks.length > 0);
     const shows = made.map((capture) => h("button", { type: "button", onclick: () => open(capture) }, `Show ${capture.name}`));
     had.replaceChildren(table(HEAD, figureRows(result)), h("div", { class: "bar" }, ...shows));
     taken(made);
@@ -115,6 +135,8 @@ export function testMotionPanel(shared, report, { taken, open }) {
     root,
     update({ nodes }) {
       const node = nodes.find((one) => one.node === shared.node);
+      drive = node ?? null;
+      for (const { update } of Object.values(inputs)) update(node?.feed_m ?? null);
       if (!root.open) return;
       risk.update(node ? [node] : [], inControl());
       const isMoved = node?.doing === DOING;

@@ -74,6 +74,25 @@ export function foundRows(report) {
   ].filter(Boolean);
 }
 
+/** What a capture shows, as rows of a name and a figure. */
+export function identifiedRows(report) {
+  const { inertia_kg_m2, anti_resonance_hz, resonance_hz, proportional_a_s_rad } = report;
+  const masses = inertia_kg_m2 === null
+    ? [["Acceleration for each A", `${digits(report.gain_rad_s2_a)} rad/s²`], ["Viscous friction", `${digits(report.viscous_per_s)} 1/s of its inertia`]]
+    : [["Inertia", `${digits(inertia_kg_m2)} kg·m²`], ["Viscous friction", `${digits(report.viscous_friction_nm_s)} N·m·s/rad`]];
+  return [
+    ...masses,
+    ["Anti-resonance, resonance", resonance_hz === null ? "none was found" : `${number(anti_resonance_hz, 1)} Hz, ${number(resonance_hz, 1)} Hz`],
+    ["Delay", `${number(report.delay_ms, 1)} ms`],
+    ...(proportional_a_s_rad === null ? [] : [["Its speed loop", `${digits(proportional_a_s_rad)} A/(rad/s), ${digits(report.integral_a_rad)} A/rad`]]),
+    ["Coherent", `at ${report.coherent} of ${report.frequencies} frequencies`],
+    ["Model and captured response differ by", `${number(100 * report.model_off, 0)} %`],
+  ];
+}
+
+/** Where a response is drawn to have its anti-resonance and resonance. */
+export const resonanceMarks = ({ anti_resonance_hz, resonance_hz }) => [[anti_resonance_hz, "anti-resonance"], [resonance_hz, "resonance"]].filter(([hz]) => hz);
+
 /** Margins of the loops as rows: loop, crossover, phase, sensitivity, state. */
 export function marginRows({ before, after, position }) {
   const row = (name, { crossover_hz, phase_deg, sensitivity, stable }) => [name, `${number(crossover_hz, 1)} Hz`, `${number(phase_deg, 0)}°`, number(sensitivity, 1), stable ? "stable" : "NOT stable"];
@@ -121,8 +140,9 @@ export function unwrapped(degrees) {
 /** The panes of a Bode plot: each with lines of points over the frequency. A point that is not known is left out. */
 export function bodePanes(response) {
   const hz = response.map((row) => row.hz);
+  const lines = [["drive", "drive"], ["twin", "twin"], ["model", "model"]].filter(([key]) => response.every((row) => row[key]));
   const line = (name, values) => ({ name, points: values.map((value, at) => [hz[at], value]).filter(([, value]) => Number.isFinite(value)) });
-  const of = (name, values) => [["drive", "drive"], ["twin", "twin"], ["model", "model"]].map(([key, label]) => line(label, values(response.map((row) => row[key][name]))));
+  const of = (name, values) => lines.map(([key, label]) => line(label, values(response.map((row) => row[key][name]))));
   return [
     { label: "Speed per current", unit: "dB", lines: of("db", (values) => values.map((value) => value ?? NaN)) },
     { label: "Phase", unit: "°", lines: of("deg", unwrapped) },

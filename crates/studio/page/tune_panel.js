@@ -5,7 +5,7 @@ import { h, setText, table, toggle } from "./dom.js";
 import { guarding } from "./guarding.js";
 import { ask, inControl } from "./link.js";
 import { kept, keep } from "./settings.js";
-import { FIELDS, bodePanes, foundRows, marginRows, moveRows, orderOf, rampRows, remarkOf, stepPane, warning, writingOf } from "./tune.js";
+import { FIELDS, bodePanes, foundRows, marginRows, moveRows, orderOf, rampRows, remarkOf, resonanceMarks, stepPane, warning, writingOf } from "./tune.js";
 import { picture } from "./tune_picture.js";
 
 const SETTINGS = "tune";
@@ -162,8 +162,7 @@ export function tunePanel(shared, report) {
     const { response, twin, drive } = result.curves;
     // In a narrow window the letters keep their size.
     const width = Math.max(300, Math.min(640, innerWidth - 70));
-    const marks = [[result.anti_resonance_hz, "anti-resonance"], [result.resonance_hz, "resonance"]].filter(([hz]) => hz);
-    const bode = response.length ? picture(bodePanes(response), { logarithmic: true, unit: "Hz", marks, width, says: "Frequency response of the drive as measured, of its twin and of the model, with the coherence of the measurement" }) : null;
+    const bode = response.length ? picture(bodePanes(response), { logarithmic: true, unit: "Hz", marks: resonanceMarks(result), width, says: "Frequency response of the drive as measured, of its twin and of the model, with the coherence of the measurement" }) : null;
     const steps = [stepPane("A step, on the twin", twin.map(({ step }) => step)), stepPane("A load, on the twin", twin.map(({ load }) => load)), ...(drive ? [stepPane("A step, on the drive", drive)] : [])];
     const trial = picture(steps, { logarithmic: false, unit: "ms", width, says: "Speed after a step and a load with the gains before and those proposed" });
     had.replaceChildren(

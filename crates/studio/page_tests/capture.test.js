@@ -122,7 +122,7 @@ test("a browser keeps a bounded number and a bounded size", () => {
 });
 
 test("a record has the names of the command line, both ways", () => {
-  for (const [field, title] of [["velocity_rpm", "4.velocity_rpm"], ["4:606C:00", "4.606C_00"]]) {
+  for (const [field, title] of [["velocity_rpm", "4.velocity_rpm"], ["angle_degrees", "4.position_deg"], ["4:606C:00", "4.606C_00"]]) {
     assert.equal(titleOf({ node: 4, field }), title);
     assert.deepEqual(placeOf(title), { node: 4, field });
   }

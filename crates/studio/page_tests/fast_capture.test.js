@@ -5,14 +5,14 @@ import { test } from "node:test";
 
 import { captureOfAnswer, namesIn, orderOf, remarkOf, rowsOf, timesIn } from "../page/fast_capture.js";
 
-const fields = (more = {}) => ({ chosen: ["velocity"], more: "", period_ms: "1", duration_s: "2", trigger: "", pre_ms: "0", sdo: false, ...more });
+const fields = (more = {}) => ({ chosen: ["velocity"], more: "", period_ms: "1", duration_s: "2", trigger: "", pre_ms: "0", take: "", sdo: false, ...more });
 
 test("an order has what the fields have, each quantity once, and times in ms", () => {
   assert.deepEqual(orderOf(4, fields({ more: "6041h, true_winding velocity", duration_s: "0.25", period_ms: "0.5" })), {
-    do: "capture", node: 4, quantities: ["velocity", "6041h", "true_winding"], period_ms: 0.5, duration_ms: 250, trigger: null, pre_ms: 0, sdo: false,
+    do: "capture", node: 4, quantities: ["velocity", "6041h", "true_winding"], period_ms: 0.5, duration_ms: 250, trigger: null, pre_ms: 0, take: [], sdo: false,
   });
-  const armed = orderOf(4, fields({ trigger: " velocity>10 ", pre_ms: "50", sdo: true }));
-  assert.deepEqual([armed.trigger, armed.pre_ms, armed.sdo], ["velocity>10", 50, true]);
+  const armed = orderOf(4, fields({ trigger: " velocity>10 ", pre_ms: "50", take: "tpdo1, tpdo2", sdo: true }));
+  assert.deepEqual([armed.trigger, armed.pre_ms, armed.take, armed.sdo], ["velocity>10", 50, ["tpdo1", "tpdo2"], true]);
   // What is kept of before a trigger has no meaning without one.
   assert.equal(orderOf(4, fields({ pre_ms: "50" })).pre_ms, 0);
   assert.deepEqual(namesIn(" a,b  c,"), ["a", "b", "c"]);

@@ -107,11 +107,11 @@ ferrodrive test-motion 4 sine --by 20deg --frequency 1 --periods 3 --count 2 --v
 `,
   );
   const path = { after_s: 0, command: { ...measured[4].command, motion: { ...motion, shape: "path", path: [[0, 0], [1, 90]] } } };
-  assert.match(commandLine([path], "can0"), /^# left out: node 4: a test motion along a path of 2 points; .*test-motion 4 path --path FILE$/m);
+  assert.match(commandLine([path], "can0"), /^cat > path4.csv <<'END'\nt_s,4.position_deg,mark\n0,0,\n1,90,\nEND\nferrodrive test-motion 4 path --path path4.csv --count 2 --velocity 60rpm /m);
   assert.match(python([path], "can0"), /test_motion\("path", "velocity", path=\[\(0, 0\), \(1, 90\)\], count=2, velocity_rpm=60,/);
 });
 
-test("and those of Python, and a scenario what it has words for", () => {
+test("and those of Python and of a scenario", () => {
   const text = python(measured, "can0");
   for (const line of [
     '    network.nmt("start", 4)',
@@ -123,7 +123,7 @@ test("and those of Python, and a scenario what it has words for", () => {
     '    node_4.test_motion("sine", "velocity", by=20, frequency=1, periods=3, count=2, velocity_rpm=60, travel_turns=2, following_error=72, period=0.01, capture_period=0.002)',
   ]) assert.ok(text.includes(`${line}\n`), line);
   const lines = scenario(measured, [{ node: 4, model: "zlac8030l" }]);
-  for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    # left out: node 4: store the parameters', '    # left out: node 4: Test motion sine, 2 runs']) assert.ok(lines.includes(`${line}\n`), line);
+  for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    "4 save",', '    "4 capture velocity 6041h:00 rate 1ms trigger velocity>10 pre 50ms for 2000ms",', '    "4 test-motion sine by 20deg frequency 1 periods 3 count 2 velocity 60rpm travel 2 following-error 72deg period 10ms capture velocity rate 2ms",']) assert.ok(lines.includes(`${line}\n`), line);
 });
 
 const together = [
@@ -201,7 +201,7 @@ test("a tuning has its limits in each form, and its trial as its option", () => 
   );
   const text = python(tuned, "can0");
   for (const line of ["    node_4.tune(phase_margin=45, speed_rpm=60, current_a=8, travel_turns=20, period=0.005, apply=True)  # waits for its end", "    node_4.tune(bandwidth=20, position=True, current_a=8, travel_turns=20, period=0.005, torque_constant=0.9)  # waits for its end"]) assert.ok(text.includes(`${line}\n`), line);
-  assert.match(scenario(tuned, [{ node: 4, model: "zlac8030l" }]), /^ {4}# left out: node 4: Find gains for a phase margin of 45°.*\n {4}"wait 40s",\n {4}# left out: node 4: Try the gains that were found last$/m);
+  assert.match(scenario(tuned, [{ node: 4, model: "zlac8030l" }]), /^ {4}"4 tune phase-margin 45 speed 60rpm current 8A travel 20turn period 5ms apply",\n {4}"wait 20s",\n {4}"4 save",$/m);
 });
 
 test("gains that are put back at once were only found, and what stands between is not passed over", () => {
@@ -249,12 +249,12 @@ test("a held base has its time in each form, with the machine that it takes", ()
   assert.equal(shownStep(held[1], 1), "+1.50 s End of the held motion");
   const models = [4, 5].map((node) => ({ node, model: "zlac8030l" }));
   const shell = commandLine(held, "can0", models);
-  for (const line of ["wheels = [4, 5]", "turns = [1, -1]", "wheel_m_s = 0.3", "angular_rad_s = 1.5", "ferrodrive drive-base base.toml --linear 0.1 --angular 0.25 --for 1500ms", "sleep 2", "# left out: nodes 1, 2: Turn together at 30, -15 r/min for 0.7 s"]) assert.ok(shell.includes(`${line}\n`), line);
+  for (const line of ["wheels = [4, 5]", "turns = [1, -1]", "wheel_m_s = 0.3", "angular_rad_s = 1.5", "ferrodrive drive-base base.toml --linear 0.1 --angular 0.25 --for 1500ms", "sleep 2", "ferrodrive velocity 1 30rpm --no-wait\nferrodrive velocity 2 -15rpm --no-wait\nsleep 0.7\nferrodrive stop 1\nferrodrive stop 2"]) assert.ok(shell.includes(`${line}\n`), line);
   assert.match(commandLine(held, "can0"), /^# left out: nodes 4, 5: .*the models of its wheels are not known$/m);
   const program = python(held, "can0", models);
-  for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)"]) assert.ok(program.includes(`${line}\n`), line);
+  for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)", "    node_1.velocity(30, wait=False)\n    node_2.velocity(-15, wait=False)\n    network.sleep(0.7)\n    node_1.stop()\n    node_2.stop()"]) assert.ok(program.includes(`${line}\n`), line);
   const run = scenario([...held, { after_s: 1, command: { ...base, wheels: [5, 4] } }], models);
-  for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
+  for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', '    "1 velocity 30rpm no-wait",\n    "2 velocity -15rpm no-wait",\n    "wait 700ms",\n    "1 stop",\n    "2 stop",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
   assert.match(run, /^ {4}# left out: nodes 5, 4: .*: another base$/m);
   // Something else to one of its drives ends it; what another drive gets meanwhile does not.
   const next = (command) => commandLine([held[0], { after_s: 1, command: { do: "reset_fault", node: 4 } }, { after_s: 1, command }, { after_s: 3, command: { do: "enable", node: 4 } }], "can0", models);

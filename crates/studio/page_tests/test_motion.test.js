@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FIELDS, SHAPES, capturesOf, figureRows, orderOf, pathOf, remarkOf } from "../page/test_motion.js";
+import { FIELDS, SHAPES, capturesOf, figureRows, orderOf, otherDrive, pathOf, remarkOf } from "../page/test_motion.js";
 
 const texts = (more = {}) => ({ ...Object.fromEntries(Object.entries(FIELDS).map(([name, { usual }]) => [name, usual])), ...more });
 const order = (shape, more = {}, path = null) => orderOf(4, { shape, texts: texts(more), quantities: "", path });
@@ -38,6 +38,16 @@ test("a path is the position of a capture from its begin, thinned so that it fit
   assert.ok(path.every(([at, degrees]) => Math.abs(degrees - 10 * at) < 1e-4));
   assert.deepEqual(order("path", {}, path).motion.path, path);
   assert.equal(pathOf({ columns: [long.columns[0]] }), null);
+});
+
+test("a path of another drive is named as that", () => {
+  const of = (node, model) => ({ columns: [{ field: "velocity_rpm", node: 9 }, { field: "angle_degrees", node }], model });
+  const own = { node: 5, model: "zlac8030l" };
+  assert.equal(otherDrive(of(5, "zlac8030l"), own), "");
+  assert.equal(otherDrive(of(5), own), "", "a log does not name its model");
+  assert.equal(otherDrive(of(null), own), "", "a column that names no node");
+  assert.equal(otherDrive(of(4, "zlac8030l"), own), "The path was captured of node 4 (zlac8030l), and node 5 (zlac8030l) is moved along it.");
+  assert.equal(otherDrive(of(5, "zlim42c"), own), "The path was captured of node 5 (zlim42c), and node 5 (zlac8030l) is moved along it.");
 });
 
 const capture = (begun_s, values) => ({

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FIELDS, bodePanes, digits, foundRows, marginRows, moveRows, orderOf, rampRows, remarkOf, stepPane, unwrapped, warning, writingOf } from "../page/tune.js";
+import { FIELDS, bodePanes, digits, foundRows, identifiedRows, marginRows, moveRows, orderOf, rampRows, remarkOf, stepPane, unwrapped, warning, writingOf } from "../page/tune.js";
 import { decades, range, ticks } from "../page/tune_picture.js";
 
 const texts = (finds, more = {}) => ({ ...Object.fromEntries(Object.entries(FIELDS[finds]).map(([name, { usual }]) => [name, usual])), speed_rpm: "120", ...more });
@@ -52,6 +52,18 @@ test("what was found is shown with its units, and what was not found as that", (
   ]);
 });
 
+test("what a capture shows is said in what is known of its motor", () => {
+  const captured = { inertia_kg_m2: 0.03, viscous_friction_nm_s: 0.01, gain_rad_s2_a: 28, viscous_per_s: 0.333, anti_resonance_hz: null, resonance_hz: null, delay_ms: 1.24, model_off: 0.052, coherent: 40, frequencies: 60, proportional_a_s_rad: 2.4, integral_a_rad: 30 };
+  const rows = Object.fromEntries(identifiedRows(captured));
+  assert.deepEqual(rows, {
+    Inertia: "0.03 kg·m²", "Viscous friction": "0.01 N·m·s/rad", "Anti-resonance, resonance": "none was found", Delay: "1.2 ms", "Its speed loop": "2.4 A/(rad/s), 30 A/rad",
+    Coherent: "at 40 of 60 frequencies", "Model and captured response differ by": "5 %",
+  });
+  // Without its torque per ampere, and its set-point.
+  const other = Object.fromEntries(identifiedRows({ ...captured, inertia_kg_m2: null, viscous_friction_nm_s: null, proportional_a_s_rad: null, integral_a_rad: null, anti_resonance_hz: 12, resonance_hz: 20.04 }));
+  assert.deepEqual([other["Acceleration for each A"], other["Viscous friction"], other["Anti-resonance, resonance"], other["Its speed loop"]], ["28 rad/s²", "0.333 1/s of its inertia", "12.0 Hz, 20.0 Hz", undefined]);
+});
+
 test("a move is shown on the twin, and on the drive once it was tried there", () => {
   const twin_move = [{ overshoot_deg: 0.25, settled_s: 1.234 }, { overshoot_deg: 9, settled_s: null }];
   const on_twin = ["On its twin", "settled after 1.23 s, 0.3° beyond", "does not settle, 9.0° beyond"];
@@ -83,6 +95,9 @@ test("a Bode plot has drive, twin and model, and leaves out what is not known", 
   const [gain, phase, coherence] = bodePanes([row(1, 10), row(10, -10)]);
   assert.deepEqual(gain.lines.map(({ name, points }) => [name, points]), [["drive", [[1, 10], [10, -10]]], ["twin", []], ["model", [[1, 1], [10, 1]]]]);
   assert.equal(phase.lines.length, 3);
+  // What a capture shows has no twin.
+  const [captured] = bodePanes([{ ...row(1, 10), twin: null }, { ...row(10, 4), twin: null }]);
+  assert.deepEqual(captured.lines.map(({ name }) => name), ["drive", "model"]);
   assert.deepEqual([coherence.low, coherence.high, coherence.lines[0].points], [0, 1, [[1, 0.9], [10, 0.9]]]);
   assert.deepEqual(stepPane("A step", [{ period_s: 0.002, speed_rpm: [60, 90] }, { period_s: 0.001, speed_rpm: [60] }]).lines, [{ name: "before", points: [[0, 60], [2, 90]] }, { name: "after", points: [[0, 60]] }]);
 });

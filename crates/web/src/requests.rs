@@ -73,7 +73,7 @@ pub(crate) fn respond(handle: &HostHandle, request: &Request, body: &[u8]) -> Re
             Ok(of_json(&json!({ "ok": true })))
         }
         "/api/recording.mcap" => return not_here("does not make MCAP files: save a CSV"),
-        "/api/recording" | "/api/trace/load" => {
+        "/api/recording" | "/api/recording/identified" | "/api/trace/load" => {
             return not_here("does not read records and logs: the studio does (ferrodrive studio)");
         }
         "/api/trace.asc" | "/api/trace.blf" | "/api/trace.pcapng" => {

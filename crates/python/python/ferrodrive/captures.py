@@ -77,7 +77,7 @@ def tune_capture(path: File, node: Optional[int] = None, *, torque_constant: Opt
     :param path: ``NAME.mcap`` or ``NAME.csv`` with ``current_demand_a`` or ``current_a``, ``position_deg`` or ``velocity_rpm``, and best of all
         ``velocity_demand_rpm``
     :param node: of which node, where the file has several
-    :param torque_constant: N m per A of its motor
+    :param torque_constant: N m per A of its motor; of a model without a reducer that is named in the file, without it, that which it is delivered with
     :raises MasterError: what it lacks, or why nothing can be said of it
 
     >>> ferrodrive.save_capture(drive.capture("velocity", duration=0.05, period=0.002), "run.csv")

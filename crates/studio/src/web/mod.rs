@@ -134,6 +134,10 @@ fn handler(operation: Operation) -> MethodRouter<Web> {
             recording::values(web.handle, web.records, asked, body).await
         })
         .layer(DefaultBodyLimit::max(recording::LARGEST)),
+        Operation::Identified => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
+            recording::identified(web.handle, web.records, asked, body).await
+        })
+        .layer(DefaultBodyLimit::max(recording::LARGEST)),
         Operation::ParametersToml => post(async |State(web): State<Web>, asked, body: axum::body::Bytes| {
             parameters::toml(web.records, asked, body).await
         })

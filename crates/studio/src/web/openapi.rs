@@ -24,6 +24,7 @@ pub(super) enum Operation {
     LoadedIdentifiers,
     RecordingMcap,
     Recording,
+    Identified,
     ParametersToml,
 }
 
@@ -49,7 +50,7 @@ const SAVED: &[(&str, &str)] =
     &[("200", "The frames of the chosen nodes and kinds"), MALFORMED, LET_IN, ("429", "Others are fetching it"), OVER];
 
 /// All requests. No GET changes anything, and no request moves a drive: motion goes through the socket, where it is held.
-pub(super) const ROUTES: [Route; 20] = [
+pub(super) const ROUTES: [Route; 21] = [
     Route {
         path: "/api/state",
         method: "get",
@@ -230,6 +231,21 @@ pub(super) const ROUTES: [Route; 20] = [
         ],
     },
     Route {
+        path: "/api/recording/identified",
+        method: "post",
+        operation: Operation::Identified,
+        summary: "What a file shows of a drive, as `ferrodrive tune --capture`: frequency response, masses, speed loop; the body is as for /api/recording",
+        answers: &[
+            ("200", "What was found"),
+            ("400", "The body is not such a file, or what it lacks"),
+            LET_IN,
+            FOREIGN,
+            ("413", "More than 32 MB"),
+            ("429", "Another record is being read"),
+            OVER,
+        ],
+    },
+    Route {
         path: "/api/parameters.toml",
         method: "post",
         operation: Operation::ParametersToml,
@@ -283,6 +299,10 @@ const fn parameters(operation: Operation) -> &'static [(&'static str, &'static s
         Operation::Recording | Operation::TraceLoad => {
             &[("name", "string", "Name of the file: its ending shows what it is")]
         }
+        Operation::Identified => &[
+            ("name", "string", "Name of the file: its ending shows what it is"),
+            ("node", "integer", "The node, 1 to 127, where the file has several"),
+        ],
         Operation::ParametersToml => &[("node", "integer", "The node-ID to use if the file has none, 1 to 127")],
         Operation::Faults => &[("since", "integer", "The revision of the last answer; 0 for everything")],
         _ => &[],

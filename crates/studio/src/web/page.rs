@@ -88,6 +88,7 @@ const SOURCES: &[(&str, &str)] = files![
     "help.js",
     "homing.js",
     "homing_picture.js",
+    "identified_panel.js",
     "tour.js",
     "heard.js",
     "trace.js",

@@ -1,4 +1,4 @@
-//! Files of values: those that a page keeps, as a record; a record or a log that it loads, as values.
+//! Files of values: those that a page keeps, as a record; a record or a log that it loads, as values, or as what they show of a drive.
 
 use std::sync::Arc;
 
@@ -9,8 +9,11 @@ use axum::http::StatusCode;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse, Response};
 use can::Instant;
+use canopen::NodeId;
 use host::HostHandle;
-use recording::{Kind, Recorded, mcap_of_csv, read};
+use host::capture::{record_of_log, refusal};
+use host::tune::{CaptureReport, of_capture};
+use recording::{Capture, Kind, Recorded, mcap_of_csv, read};
 use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
 
@@ -20,21 +23,37 @@ use super::log_file::{LogFile, format_of};
 /// The largest accepted record in bytes: a minute of twelve objects at 1 kHz has about half of it.
 pub(super) const LARGEST: usize = 32 << 20;
 
-/// Converts a CSV to MCAP, in another thread than the task that moves drives.
-pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
+/// Work on a file, in another thread than the task that moves drives, one at a time. What it answers, or why the file is refused.
+async fn in_turn(
+    records: Arc<Semaphore>,
+    work: impl FnOnce() -> Result<Response, (&'static str, String)> + Send + 'static,
+) -> Response {
     let Ok(permit) = records.try_acquire_owned() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being converted: try again");
+        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being read or made: try again");
     };
     let work = move || {
         // It goes on if the client goes away, and so does its turn.
         let _permit = permit;
-        mcap_of_csv(&csv)
+        work()
     };
     match tokio::task::spawn_blocking(work).await {
-        Ok(Ok(file)) => ([(CONTENT_TYPE, "application/octet-stream")], file).into_response(),
-        Ok(Err(why)) => trouble(StatusCode::BAD_REQUEST, "malformed", &why),
+        Ok(Ok(answer)) => answer,
+        Ok(Err((kind, why))) => trouble(StatusCode::BAD_REQUEST, kind, &why),
         Err(_) => trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending"),
     }
+}
+
+/// Converts a CSV to MCAP.
+pub(super) async fn mcap(records: Arc<Semaphore>, csv: Bytes) -> Response {
+    let converted = move || match mcap_of_csv(&csv) {
+        Ok(file) => Ok(([(CONTENT_TYPE, "application/octet-stream")], file).into_response()),
+        Err(why) => Err(("malformed", why)),
+    };
+    in_turn(records, converted).await
+}
+
+fn as_json(value: &impl Serialize) -> Result<Response, (&'static str, String)> {
+    serde_json::to_string(value).map(json_text).map_err(|error| ("malformed", error.to_string()))
 }
 
 /// The query of a file that is loaded.
@@ -81,29 +100,57 @@ pub(super) async fn values(
         Ok(Query(Named { name })) => name,
         Err(rejection) => return trouble(StatusCode::BAD_REQUEST, "malformed", &rejection.body_text()),
     };
-    let Ok(permit) = records.try_acquire_owned() else {
-        return trouble(StatusCode::TOO_MANY_REQUESTS, "busy", "another record is being read: try again");
+    in_turn(records, move || as_json(&of_file(&handle, &name, &file).map_err(|why| ("malformed", why))?)).await
+}
+
+/// The query of a file from which a drive is identified.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Identified {
+    name: String,
+    node: Option<u8>,
+}
+
+/// What a record or a log shows of a drive: its frequency response, masses and speed loop. Nothing moves.
+pub(super) async fn identified(
+    handle: HostHandle,
+    records: Arc<Semaphore>,
+    asked: Result<Query<Identified>, QueryRejection>,
+    file: Bytes,
+) -> Response {
+    let asked = match asked {
+        Ok(Query(asked)) => asked,
+        Err(rejection) => return trouble(StatusCode::BAD_REQUEST, "malformed", &rejection.body_text()),
     };
-    let work = move || {
-        let _permit = permit;
-        let values = of_file(&handle, &name, &file)?;
-        serde_json::to_string(&values).map_err(|error| error.to_string())
+    in_turn(records, move || as_json(&identify(&handle, &asked, &file)?)).await
+}
+
+fn identify(
+    handle: &HostHandle,
+    Identified { name, node }: &Identified,
+    bytes: &[u8],
+) -> Result<CaptureReport, (&'static str, String)> {
+    let recorded = match Kind::of_name(name) {
+        Some(kind) => read(kind, bytes),
+        None => log_of(name, bytes).and_then(|mut log| record_of_log(handle.trace().fresh_decoder(), &mut log)),
     };
-    match tokio::task::spawn_blocking(work).await {
-        Ok(Ok(json)) => json_text(json),
-        Ok(Err(why)) => trouble(StatusCode::BAD_REQUEST, "malformed", &why),
-        Err(_) => trouble(StatusCode::SERVICE_UNAVAILABLE, "over", "the studio is ending"),
-    }
+    let capture = recorded.and_then(|recorded| Capture::of_node(&recorded, *node));
+    let capture = capture.map_err(|why| ("malformed", format!("{name}: {why}")))?;
+    let model = NodeId::new(capture.place.node).and_then(|node| handle.trace().model(node));
+    of_capture(&capture, None, model).map_err(|failure| refusal(&failure))
+}
+
+/// A log of frames, by what is in it or by its name.
+fn log_of<'a>(name: &str, bytes: &'a [u8]) -> Result<LogFile<'a>, String> {
+    let expected = "expected a record (.mcap, .csv) or a log of frames (candump, ASC, BLF, TRC, pcap, pcapng)";
+    format_of(name, bytes).map(|format| LogFile::new(bytes, format)).ok_or_else(|| expected.to_owned())
 }
 
 fn of_file(handle: &HostHandle, name: &str, bytes: &[u8]) -> Result<Values, String> {
     if let Some(kind) = Kind::of_name(name) {
         return read(kind, bytes).map(of_record).map_err(|why| format!("{name}: {why}"));
     }
-    let format = format_of(name, bytes).ok_or_else(|| {
-        format!("{name}: expected a record (.mcap, .csv) or a log of frames (candump, ASC, BLF, TRC, pcap, pcapng)")
-    })?;
-    of_log(handle, LogFile::new(bytes, format)).map_err(|why| format!("{name}: {why}"))
+    log_of(name, bytes).and_then(|log| of_log(handle, log)).map_err(|why| format!("{name}: {why}"))
 }
 
 fn of_record(recorded: Recorded) -> Values {
@@ -195,6 +242,46 @@ mod tests {
         }
         let blf = blf.finish().expect("written").into_inner();
         assert_eq!(loaded("a.blf", &blf).expect("a log")["columns"], values["columns"]);
+    }
+
+    /// A wheel of 0.02 kg m² with 0.05 N m s/rad, of a motor with the torque constant that a ZLAC8030L is delivered with, driven by a
+    /// current with a random sign every 8 ms: between two samples it approaches its final speed exponentially.
+    #[test]
+    fn a_record_identifies_its_drive_as_the_command_line_does() {
+        const PERIOD_S: f64 = 1e-3;
+        let (handle, _inbox) = channel(Trace::new(master::Models::default(), Origin::default()));
+        let asked = |node| Identified { name: "a.csv".into(), node };
+        let identify = |node, text: &str| {
+            let found = identify(&handle, &asked(node), text.as_bytes())?;
+            serde_json::to_value(&found).map_err(|error| ("json", error.to_string()))
+        };
+        let constant = host::tune::motor_of(devices::model("zlac8030l").expect("it is there")).expect("a motor");
+        let constant = constant.windings.torque_constant_nm_a();
+        let (inertia, viscous) = (0.02, 0.05);
+        let decay = (-viscous / inertia * PERIOD_S).exp();
+        let (mut angle, mut speed, mut current, mut bits) = (0.0, 0.0, 2.0, 1_u32);
+        let about = r#""capture {""name"":""run"",""model"":""zlac8030l""}""#;
+        let mut csv = format!("t_s,4.current_demand_a,4.position_deg,mark\n0,,,{about}\n");
+        for row in 0..8000_u32 {
+            if row % 8 == 0 {
+                // A linear congruential generator (D. E. Knuth, "The Art of Computer Programming" 2, 3.2.1).
+                bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                current = if bits >> 31 == 0 { 2.0 } else { -2.0 };
+            }
+            csv += &format!("{},{current},{},\n", f64::from(row) * PERIOD_S, f64::to_degrees(angle));
+            let last = constant * current / viscous;
+            angle += last * PERIOD_S + (speed - last) * (1.0 - decay) * inertia / viscous;
+            speed = last + (speed - last) * decay;
+        }
+        let found = identify(Some(4), &csv).expect("it is identified");
+        let of = |name: &str| found[name].as_f64().expect("a number");
+        assert!((of("inertia_kg_m2") / inertia - 1.0).abs() < 0.05, "{found}");
+        assert!((of("viscous_friction_nm_s") / viscous - 1.0).abs() < 0.1, "{found}");
+        assert_eq!((found["node"].as_u64(), &found["resonance_hz"]), (Some(4), &serde_json::Value::Null));
+        let (kind, why) = identify(Some(5), &csv).expect_err("another node");
+        assert!(kind == "malformed" && why.contains("no values of node 5 are in it, only of: 4"), "{why}");
+        let (kind, why) = identify(None, "t_s,4.velocity_rpm,mark\n0,1,\n1,2,\n").expect_err("nothing of a current");
+        assert!(kind == "bad_file" && why.contains("it has no current in A") && !why.contains('\n'), "{why}");
     }
 
     #[test]

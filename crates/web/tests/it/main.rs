@@ -188,6 +188,7 @@ fn requests_are_answered_as_by_the_studio() {
         ("/api/parameters.toml?node=0", 400, "malformed"),
         ("/api/recording.mcap", 501, "not_here"),
         ("/api/recording?name=x.csv", 501, "not_here"),
+        ("/api/recording/identified?name=x.csv", 501, "not_here"),
         ("/api/trace/load?name=x.log", 501, "not_here"),
         ("/api/trace.asc", 501, "not_here"),
         ("/api/trace.blf", 501, "not_here"),

@@ -13,8 +13,9 @@ const OFFERED: &str =
 async fn of_nine_drives_one_is_found_by_a_word_and_the_table_is_sorted() {
     let folder = processes::scratch("studio_nine_drives");
     let machine = folder.join("machine.toml");
-    let drive =
-        |node: u8| format!("    {{ model = \"{}\", node = {node} }},\n", if node == 7 { "zlim42c" } else { "cia402" });
+    // A turn of the spindle of node 7 moves 90 mm.
+    let of = |node| if node == 7 { "\"zlim42c\", units = { feed_constant = \"90mm\" }" } else { "\"cia402\"" };
+    let drive = |node: u8| format!("    {{ model = {}, node = {node} }},\n", of(node));
     let text = format!("drive = [\n{}]\n", (1..=9).map(drive).collect::<String>());
     std::fs::write(&machine, text).expect("it is written");
     let bus = format!("sim:{}", machine.display());
@@ -34,6 +35,14 @@ async fn of_nine_drives_one_is_found_by_a_word_and_the_table_is_sorted() {
     stage.choose(".motion .many-drives .choice", "7").await;
     stage.says(".motion h2", "Node 7: ").await;
     stage.shoot("nine_drives").await;
+    // 90° are 22.5 mm there, and the 20° of a test motion 5 mm.
+    let [distance, amplitude] =
+        ["#move-degrees", "#test-by_deg"].map(|css| format!("return document.querySelector('{css}').value"));
+    stage.choose("#motion-unit-angle_degrees", "mm").await;
+    stage.until("the distance is in mm", async || stage.script(&distance).await == "22.5").await;
+    stage.click("#tabs [data-name=scope]").await;
+    stage.until("the amplitude is in mm", async || stage.script(&amplitude).await == "5").await;
+    stage.click("#tabs [data-name=motion]").await;
     stage.is_usable("a list of drives").await;
     stage.close().await;
 }

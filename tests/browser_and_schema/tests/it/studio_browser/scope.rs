@@ -35,7 +35,7 @@ async fn the_scope_keeps_what_the_drive_said_and_saves_it() {
     let mut lines = saved.lines();
     assert_eq!(
         lines.next(),
-        Some("t_s,4.velocity_rpm,4.angle_degrees,4.current_a,4.supply_v,4.position_counts,4.statusword,mark")
+        Some("t_s,4.velocity_rpm,4.position_deg,4.current_a,4.supply_v,4.position_counts,4.statusword,mark")
     );
     // A line of what happened has no values.
     let values = lines.filter(|line| !line.contains(",,"));
