@@ -2,6 +2,8 @@
 
 import asyncio
 import math
+import subprocess
+import sys
 import threading
 import time
 
@@ -207,6 +209,38 @@ def test_a_connection_that_goes_and_comes_is_a_warning_and_the_cause_of_what_fai
                     break
                 except ferrodrive.MasterError:
                     assert time.monotonic() < deadline, "the bus did not come back"
+
+
+CAPTURES = """
+import sys
+import ferrodrive
+
+with ferrodrive.Network(sys.argv[1]) as network:
+    network.drive(5, "cia402").capture("velocity", duration=3600.0, period=0.01)
+"""
+
+
+def test_a_program_that_is_killed_while_it_captures_leaves_the_way_back(simulator, tmp_path):
+    bus, journal = f"socketcand://127.0.0.1:{simulator.port()}/can0", tmp_path / "ferrodrive-node5.journal"
+    with ferrodrive.Network(bus) as network:
+
+        def tpdos():
+            return [network.upload(5, index, sub) for at in range(4) for index, sub in ((0x1800 + at, 1), (0x1800 + at, 2), (0x1A00 + at, 0))]
+
+        before = tpdos()
+        program = subprocess.Popen([sys.executable, "-c", CAPTURES, bus], cwd=tmp_path)
+        try:
+            while not (journal.exists() and "whole = true" in journal.read_text() and tpdos() != before):
+                assert program.poll() is None, "it ended"
+                # Another process is waited for.
+                time.sleep(0.05)
+        finally:
+            program.kill()
+            program.wait()
+        assert journal.exists()
+        network.params(5, "cia402").rollback(journal)
+        assert tpdos() == before
+        assert not journal.exists()
 
 
 def test_a_simulator_that_ends_is_an_error_not_a_hang(simulator):
