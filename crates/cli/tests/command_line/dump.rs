@@ -36,6 +36,33 @@ fn a_line_that_is_no_frame_is_told_with_its_number_and_passed_over() {
     assert!(shown.err.contains("no frame, and 1000 places skipped") && shown.err.lines().count() < 30, "{}", shown.err);
 }
 
+/// Heartbeats of node 4 and SYNCs, by their times in the log.
+#[test]
+fn the_identifiers_of_a_log_have_a_row_each() {
+    let directory = scratch("identifiers");
+    let log = directory.join("trace.log");
+    let lines = "(1.000) can0 704#05\n(1.010) can0 080#\n(1.030) can0 080#\n(2.000) can0 704#05\n(2.500) can0 704#7F\n(3.0) can0 18FEF100#01\n";
+    std::fs::write(&log, lines).unwrap();
+    let options = |options: &[&str]| {
+        let bus = format!("log:{}", log.display());
+        ferrodrive(&[&["--bus", &bus, "dump", "--identifiers"], options].concat())
+    };
+    let shown = options(&[]);
+    let rows: Vec<Vec<&str>> = shown.out.lines().map(|line| line.split_whitespace().take(4).collect()).collect();
+    assert_eq!(
+        rows[1..],
+        [["080", "2", "20.000", "20.000"], ["704", "3", "500.000", "1000.000"], ["18FEF100", "1", "-", "-"]]
+    );
+    assert!(
+        shown.out.contains("heartbeat node 4: pre-operational") && shown.err.contains("6 frames in 2.000 s"),
+        "{}",
+        shown.err
+    );
+    let of_sync = options(&["--service", "sync", "--json"]);
+    let row: Value = serde_json::from_str(&of_sync.out).unwrap();
+    assert_eq!((&row["id"], &row["count"], &row["least_ms"]), (&json!("080"), &json!(2), &json!(20.0)), "{row}");
+}
+
 #[test]
 fn objects_that_all_models_name_alike_are_named_without_a_model_and_have_no_unit_that_they_do_not_share() {
     let directory = scratch("names");

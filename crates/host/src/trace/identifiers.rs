@@ -16,7 +16,7 @@ use super::ring::Held;
 
 /// The frames of one identifier within a part of the trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-struct Identifier {
+pub struct Identifier {
     /// COB-ID, hexadecimal.
     id: String,
     count: u64,
@@ -71,24 +71,50 @@ impl Passing {
     }
 }
 
+/// Frames by identifier, as they pass: in the order of identifiers, standard ones before extended ones.
+#[derive(Default)]
+pub struct ByIdentifier(BTreeMap<(bool, u32), Passing>);
+
+impl ByIdentifier {
+    /// Adds a frame, which has this number.
+    pub fn take(&mut self, number: u64, passed: &BusFrame, decoded: &Decoded) {
+        let id = passed.frame.id();
+        match self.0.entry((id.is_extended(), id.raw())) {
+            Entry::Vacant(place) => drop(place.insert(Passing::new(number, passed, decoded))),
+            Entry::Occupied(mut one) => one.get_mut().take(number, passed, decoded),
+        }
+    }
+
+    /// What there was of each.
+    pub fn ended(self) -> Vec<Identifier> {
+        self.0.into_values().map(Passing::ended).collect()
+    }
+}
+
+impl Identifier {
+    /// For people: COB-ID, frames, the shortest and the longest time between two of them in ms, service, and the last one in words.
+    pub fn cells(&self) -> [String; 6] {
+        let ms = |time: Option<f64>| time.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.3}"));
+        let TraceLine { kind, text, .. } = &self.last;
+        let count = self.count.to_string();
+        [self.id.clone(), count, ms(self.least_ms), ms(self.most_ms), (*kind).to_owned(), text.clone()]
+    }
+}
+
 impl Query {
     /// The frames that match, by identifier, in the order of identifiers: standard ones before extended ones.
     pub fn identifiers(&self, held: &Held) -> Identifiers {
         let (floor, to) = self.bounds(held);
         // A reader of a studio that was started anew has seen more than there is.
         let from = floor.max(to.saturating_sub(MOST_SEARCHED)).min(to);
-        let mut found: BTreeMap<(bool, u32), Passing> = BTreeMap::new();
+        let mut found = ByIdentifier::default();
         self.each(held, from, to, |number, passed, decoded, _| {
             if !self.words().is_empty() && !TraceLine::of_frame(number, passed, decoded).has(self.words()) {
                 return;
             }
-            let id = passed.frame.id();
-            match found.entry((id.is_extended(), id.raw())) {
-                Entry::Vacant(place) => drop(place.insert(Passing::new(number, passed, decoded))),
-                Entry::Occupied(mut one) => one.get_mut().take(number, passed, decoded),
-            }
+            found.take(number, passed, decoded);
         });
         let skipped = self.after().map_or(0, |after| from.saturating_sub(after));
-        Identifiers { from, to, skipped, identifiers: found.into_values().map(Passing::ended).collect() }
+        Identifiers { from, to, skipped, identifiers: found.ended() }
     }
 }

@@ -12,6 +12,7 @@ mod query;
 mod ring;
 mod series;
 
+pub use identifiers::{ByIdentifier, Identifier};
 pub use origin::Origin;
 pub use query::{Asked, Query};
 pub use ring::{Held, Trace};

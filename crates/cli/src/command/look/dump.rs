@@ -5,9 +5,10 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use can::{CanId, Frame, Instant};
+use can::{BusFrame, CanId, Frame, Instant};
 use canlog::{AnyLogReader, Content, Direction, Entry, Finding, Format as LogFormat, Place, Record};
 use canopen::NodeId;
+use host::trace::{ByIdentifier, Identifier};
 use master::decode::{Decoder, ServiceKind};
 use serde::Serialize;
 use sim::wire::WireEvent;
@@ -25,7 +26,7 @@ use crate::recording::{LogPath, interface_of};
 use crate::session::{bus_failure, enter_real_time, exit_on_signal, runtime, virtual_world};
 use crate::signals::asked_to_end;
 use machine::file::Machine;
-use plot::Paint;
+use plot::{Paint, Table};
 use serve::writing::{CommandLog, Pace};
 use words::counted;
 use words::time::some_time;
@@ -40,6 +41,7 @@ use words::time::some_time;
     ferrodrive --bus slcan:///dev/ttyACM0?bitrate=500k dump --log trace.log\n  \
     ferrodrive --bus log:trace.log --model 4=zlac8030l dump\n  \
     ferrodrive --bus can0 dump --node 4 --service sdo,emcy --time delta\n  \
+    ferrodrive --bus can0 dump --identifiers --for 5s\n  \
     ferrodrive --bus can0 dump --object 6041,target_velocity --time absolute")]
 pub(crate) struct Dump {
     /// End after this time; with a log, after this time of the log (default on an embedded virtual bus: 2s)
@@ -48,6 +50,9 @@ pub(crate) struct Dump {
     /// Form of the time before each line (`t` of --json does not change)
     #[arg(long, value_name = "FORM", value_enum, default_value_t)]
     time: TimeForm,
+    /// One row for each COB-ID at the end: frames, the times between them, the last one
+    #[arg(long)]
+    identifiers: bool,
     #[command(flatten)]
     filter: Filter,
 }
@@ -112,6 +117,18 @@ struct Skipped {
     reason: String,
 }
 
+/// What there was of each identifier.
+#[derive(Debug, Serialize)]
+struct IdentifierTable(Vec<Identifier>);
+
+impl Report for IdentifierTable {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["COB-ID", "frames", "least ms", "most ms", "service", "last"]);
+        self.0.iter().for_each(|row| table.row(row.cells()));
+        table.plain(paint)
+    }
+}
+
 /// What came of a log with parts that are not read.
 #[derive(Debug, Serialize)]
 struct LogSummary {
@@ -143,6 +160,8 @@ struct Sink {
     keeps_all: bool,
     /// An SDO transfer may have set a further identifier of a node that is shown.
     may_have_learned: bool,
+    /// Frames by identifier, in place of lines.
+    identifiers: Option<ByIdentifier>,
     /// The bus passes on the frames of some identifiers only.
     is_filtered: bool,
     /// A line went to standard output.
@@ -167,7 +186,7 @@ impl Dump {
             (_, Some(clock)) => runtime()?.block_on(self.listen(global, clock, &mut sink)),
             (_, None) => Ok(()),
         };
-        let summarised = shown.and_then(|()| sink.summarise());
+        let summarised = shown.and_then(|()| sink.show_identifiers()).and_then(|()| sink.summarise());
         // A bus has no end; of a log there would be more.
         let partial = matches!(global.bus, BusSpec::Log { .. }) && sink.has_printed.get();
         let summarised = summarised.map_err(|failure| Failure { partial, ..failure });
@@ -230,6 +249,7 @@ impl Dump {
             result = follow(&mut bus, sink) => result?.map_or(Ok(()), |error| Err(bus_failure(global, &error))),
             result = over => {
                 if result.is_err() {
+                    sink.show_identifiers()?;
                     sink.report_counts();
                 }
                 result
@@ -279,6 +299,7 @@ impl Sink {
             of: None,
             keeps_all: global.log.is_some(),
             may_have_learned: true,
+            identifiers: dump.identifiers.then(ByIdentifier::default),
             is_filtered: false,
             has_printed: Cell::new(false),
         })
@@ -328,6 +349,10 @@ impl Sink {
         let wanted = self.filter.takes(&self.decoder, &decoded);
         self.counts.note(at, &decoded, wanted);
         if !wanted {
+            return Ok(());
+        }
+        if let Some(found) = &mut self.identifiers {
+            found.take(self.counts.frames() - 1, &BusFrame { at, own: false, frame: *frame }, &decoded);
             return Ok(());
         }
         let line = FrameLine {
@@ -409,6 +434,17 @@ impl Sink {
             counted(fd_frames, "CAN FD frame")
         );
         Ok(())
+    }
+
+    /// Shows what there was of each identifier, if that was asked for.
+    fn show_identifiers(&mut self) -> Result<(), Failure> {
+        let Some(found) = self.identifiers.take() else { return Ok(()) };
+        let rows = found.ended();
+        self.has_printed.set(!rows.is_empty());
+        if self.format.json {
+            return rows.iter().try_for_each(|row| self.format.print_json(row).map_err(Failure::of_stdout));
+        }
+        self.format.print(&IdentifierTable(rows)).map_err(Failure::of_stdout)
     }
 
     /// How many frames of what there were, for people. Programs count the lines.
