@@ -4,6 +4,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use canopen::pdo::PdoId;
 use canopen::{Mux, NodeId};
 use master::parameters::{Undone, roll_back};
 use master::{Drive, Node};
@@ -53,6 +54,8 @@ struct WrittenObjects {
     undo: Arc<[(Mux, Vec<u8>)]>,
     /// Their copy on the disk.
     journal: Option<Kept>,
+    /// Of PDOs whose mapping is among them, those that this program received or sent.
+    used: Arc<[PdoId]>,
 }
 
 impl Restorer {
@@ -101,7 +104,11 @@ impl Restorer {
 
     /// Objects are going to be written, and these writes lead back.
     pub(crate) fn note_written(&self, undo: Vec<(Mux, Vec<u8>)>, journal: Option<Kept>) {
-        self.lock().written.push(WrittenObjects { undo: undo.into(), journal });
+        let mappings =
+            undo.iter().filter_map(|(mux, _)| PdoId::of_object(mux.index).filter(|(_, is_mapping)| *is_mapping));
+        let mut used: Vec<_> = mappings.map(|(pdo, _)| pdo).filter(|pdo| self.node().uses_pdo(*pdo)).collect();
+        used.dedup();
+        self.lock().written.push(WrittenObjects { undo: undo.into(), journal, used: used.into() });
     }
 
     /// What was written last stays.
@@ -126,13 +133,15 @@ impl Restorer {
     /// Puts back what was written as the one with this index, and whether its journal could be deleted.
     async fn put_back(&self, at: usize) -> (Undone, Result<(), Failure>) {
         // It stays noted until it is done: this may be given up on the way.
-        let Some(undo) = self.lock().written.get(at).map(|written| Arc::clone(&written.undo)) else {
+        let found = self.lock().written.get(at).map(|written| (Arc::clone(&written.undo), Arc::clone(&written.used)));
+        let Some((undo, used)) = found else {
             return (Undone::default(), Ok(()));
         };
         let undone = roll_back(self.node(), &undo, |_| None).await;
         if !undone.not_put_back.is_empty() {
             return (undone, Ok(()));
         }
+        used.iter().for_each(|pdo| self.node().resume_pdo(*pdo));
         // A clone may have done the same meanwhile.
         let done = self.lock().written.extract_if(.., |written| Arc::ptr_eq(&written.undo, &undo)).next();
         (undone, done.and_then(|done| done.journal).map_or(Ok(()), Kept::remove))

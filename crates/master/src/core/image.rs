@@ -61,6 +61,8 @@ struct TpdoImage {
     at: Option<Instant>,
     cycle: u64,
     too_short: u32,
+    /// Its mapping was written by something else than what set it here: its frames are something else.
+    is_suspended: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -76,6 +78,25 @@ struct Rpdo {
     state: SendState,
     /// A value was written to it: the device may hold one of its frames back until the next SYNC.
     in_use: bool,
+    /// As of a TPDO.
+    is_suspended: bool,
+}
+
+impl TpdoImage {
+    const fn is_received(&self) -> bool {
+        self.id.is_some() && !self.is_suspended
+    }
+
+    /// Whether a place is one of it as it is now.
+    const fn is_of(&self, place: ImagePlace) -> bool {
+        self.generation == place.generation && !self.is_suspended
+    }
+}
+
+impl Rpdo {
+    const fn is_sent(&self) -> bool {
+        self.id.is_some() && !self.is_suspended
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,13 +122,17 @@ impl ProcessImage {
     pub fn set_tpdo(&mut self, node: NodeId, number: PdoNumber, id: u16, map: PdoMap) {
         let bytes = map.bytes();
         let unchanged = |pdo: &TpdoImage| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, Some(id), &map);
-        if self.tpdos.iter().any(unchanged) {
+        if let Some(pdo) = self.tpdos.iter_mut().find(|pdo| unchanged(pdo)) {
+            if std::mem::take(&mut pdo.is_suspended) {
+                self.index();
+            }
             return;
         }
         let before = self.tpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.tpdos[position].generation.wrapping_add(1));
         let id = Some(id);
-        let new = TpdoImage { node, number, generation, id, map, bytes, data: 0, at: None, cycle: 0, too_short: 0 };
+        let (data, at, cycle, too_short, is_suspended) = (0, None, 0, 0, false);
+        let new = TpdoImage { node, number, generation, id, map, bytes, data, at, cycle, too_short, is_suspended };
         match before {
             Some(position) => self.tpdos[position] = new,
             None => self.tpdos.push(new),
@@ -124,12 +149,42 @@ impl ProcessImage {
         self.index();
     }
 
-    /// Of an object that was written: where it is the mapping of a PDO, frames of that PDO are something else now, until it is set again.
-    pub(super) fn forget_mapping(&mut self, node: NodeId, index: u16) {
-        match PdoId::of_object(index) {
-            Some((PdoId { direction: Direction::Tpdo, number }, true)) => self.remove_tpdo(node, number),
-            Some((PdoId { direction: Direction::Rpdo, number }, true)) => self.remove_rpdo(node, number),
-            _ => {}
+    /// Of an object that was written: where it is the mapping of a PDO, frames of that PDO are something else now. It is neither received nor
+    /// sent until it is set again, or [`resumed`](Self::resume).
+    pub(super) fn note_written(&mut self, node: NodeId, index: u16) {
+        if let Some((pdo, true)) = PdoId::of_object(index)
+            && self.is_live(node, pdo)
+        {
+            self.suspend(node, pdo, true);
+        }
+    }
+
+    /// Its mapping was put back as it was.
+    pub(crate) fn resume(&mut self, node: NodeId, pdo: PdoId) {
+        self.suspend(node, pdo, false);
+    }
+
+    /// Whether a PDO is received or sent as it was set.
+    pub(crate) fn is_live(&self, node: NodeId, PdoId { direction, number }: PdoId) -> bool {
+        match direction {
+            Direction::Tpdo => self.tpdo(node, number).is_some(),
+            Direction::Rpdo => self.rpdos.iter().any(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.is_sent()),
+        }
+    }
+
+    fn suspend(&mut self, node: NodeId, PdoId { direction, number }: PdoId, is_suspended: bool) {
+        match direction {
+            Direction::Tpdo => {
+                let found = self.tpdos.iter_mut().filter(|pdo| (pdo.node, pdo.number) == (node, number));
+                found.for_each(|pdo| pdo.is_suspended = is_suspended);
+                self.index();
+            }
+            Direction::Rpdo => {
+                let is_it = |pdo: &Rpdo| (pdo.node, pdo.number) == (node, number);
+                let Some(position) = self.rpdos.iter().position(is_it) else { return };
+                (self.rpdos[position].is_suspended, self.rpdos[position].state) = (is_suspended, SendState::Idle);
+                self.unqueue(position);
+            }
         }
     }
 
@@ -138,15 +193,15 @@ impl ProcessImage {
         let id = Some(CanId::standard(id));
         let same = |pdo: &&mut Rpdo| (pdo.node, pdo.number, pdo.id, &pdo.map) == (node, number, id, &map);
         if let Some(pdo) = self.rpdos.iter_mut().find(same) {
-            pdo.trigger = trigger;
+            (pdo.trigger, pdo.is_suspended) = (trigger, false);
             return;
         }
         self.remove_rpdo(node, number);
         let bytes = map.bytes().min(MAX_DATA_LENGTH);
         let before = self.rpdos.iter().position(|pdo| (pdo.node, pdo.number) == (node, number));
         let generation = before.map_or(0, |position| self.rpdos[position].generation);
-        let new =
-            Rpdo { node, number, generation, id, map, bytes, trigger, data: 0, state: SendState::Idle, in_use: false };
+        let (data, state, in_use, is_suspended) = (0, SendState::Idle, false, false);
+        let new = Rpdo { node, number, generation, id, map, bytes, trigger, data, state, in_use, is_suspended };
         match before {
             Some(position) => self.rpdos[position] = new,
             None => {
@@ -164,13 +219,17 @@ impl ProcessImage {
         let pdo = &mut self.rpdos[position];
         pdo.generation = pdo.generation.wrapping_add(1);
         (pdo.id, pdo.map, pdo.state) = (None, PdoMap::default(), SendState::Idle);
+        self.unqueue(position);
+    }
+
+    fn unqueue(&mut self, position: usize) {
         self.pending.retain(|other| usize::from(*other) != position);
         self.waiting.retain(|other| usize::from(*other) != position);
     }
 
     /// The newest value of an object that a node sends by PDO; `None` if it is not mapped or none has come.
     pub fn value(&self, node: NodeId, mux: Mux) -> Option<Received> {
-        let carriers = self.tpdos.iter().filter(|pdo| pdo.node == node);
+        let carriers = self.tpdos.iter().filter(|pdo| pdo.node == node && !pdo.is_suspended);
         let values = carriers.filter_map(|pdo| {
             let raw = bits_of(pdo.data, pdo.map.find(mux)?);
             Some(Received { raw, at: pdo.at? })
@@ -206,7 +265,7 @@ impl ProcessImage {
     }
 
     fn tpdo(&self, node: NodeId, number: PdoNumber) -> Option<&TpdoImage> {
-        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.id.is_some())
+        self.tpdos.iter().find(|pdo| (pdo.node, pdo.number) == (node, number) && pdo.is_received())
     }
 
     /// Puts a value into every RPDO of the node that carries the object and queues them by their trigger.
@@ -243,7 +302,7 @@ impl ProcessImage {
 
     /// Where a node's TPDOs have an object, in the order in which they were set up.
     pub(crate) fn find_signals(&self, node: NodeId, mux: Mux) -> impl Iterator<Item = (PdoNumber, ImagePlace)> {
-        let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
+        let tpdos = self.tpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node && !pdo.is_suspended);
         tpdos.filter_map(move |(position, pdo)| {
             Some((pdo.number, Self::place(position, pdo.generation, &pdo.map.find(mux)?)))
         })
@@ -255,7 +314,7 @@ impl ProcessImage {
         node: NodeId,
         mux: Mux,
     ) -> impl Iterator<Item = (PdoNumber, RpdoTrigger, ImagePlace)> {
-        let rpdos = self.rpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node);
+        let rpdos = self.rpdos.iter().enumerate().filter(move |(_, pdo)| pdo.node == node && !pdo.is_suspended);
         rpdos.filter_map(move |(position, pdo)| {
             let place = Self::place(position, pdo.generation, &pdo.map.find(mux)?);
             Some((pdo.number, pdo.trigger, place))
@@ -264,8 +323,8 @@ impl ProcessImage {
 
     /// What is carried by the PDOs of a node that are in use, by their numbers.
     pub(crate) fn carried(&self, node: NodeId, to_device: bool) -> Vec<(PdoNumber, Vec<Mux>)> {
-        let tpdos = self.tpdos.iter().filter(|pdo| !to_device && pdo.id.is_some());
-        let rpdos = self.rpdos.iter().filter(|pdo| to_device && pdo.id.is_some());
+        let tpdos = self.tpdos.iter().filter(|pdo| !to_device && pdo.is_received());
+        let rpdos = self.rpdos.iter().filter(|pdo| to_device && pdo.is_sent());
         let all =
             tpdos.map(|pdo| (pdo.node, pdo.number, &pdo.map)).chain(rpdos.map(|pdo| (pdo.node, pdo.number, &pdo.map)));
         let objects = |map: &PdoMap| map.0.iter().map(|object| object.mux).collect();
@@ -279,7 +338,7 @@ impl ProcessImage {
     /// The bits of a place in a TPDO, and when they came; `None` before the first, and after a new mapping.
     #[inline]
     pub(super) fn at(&self, place: ImagePlace) -> Option<Received> {
-        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
+        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.is_of(place))?;
         Some(Received { raw: place.of(pdo.data), at: pdo.at? })
     }
 
@@ -293,7 +352,7 @@ impl ProcessImage {
     /// The bits of a place in a TPDO, and how many cycles have begun since they came; as [`at`](Self::at).
     #[inline]
     pub(super) fn aged(&self, place: ImagePlace) -> Option<(u64, u64)> {
-        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.generation == place.generation)?;
+        let pdo = self.tpdos.get(usize::from(place.slot)).filter(|pdo| pdo.is_of(place))?;
         pdo.at.map(|_| (place.of(pdo.data), self.cycle.saturating_sub(pdo.cycle)))
     }
 
@@ -301,7 +360,7 @@ impl ProcessImage {
     #[inline]
     pub(super) fn put(&mut self, place: ImagePlace, raw: u64) -> bool {
         let Some(pdo) = self.rpdos.get_mut(usize::from(place.slot)) else { return false };
-        if pdo.generation != place.generation {
+        if pdo.generation != place.generation || pdo.is_suspended {
             return false;
         }
         pdo.data = place.put(pdo.data, raw);
@@ -368,7 +427,7 @@ impl ProcessImage {
     fn index(&mut self) {
         self.by_id.fill(NONE);
         for (position, pdo) in self.tpdos.iter().enumerate() {
-            let id = pdo.id.map(usize::from);
+            let id = pdo.id.filter(|_| !pdo.is_suspended).map(usize::from);
             if let Some(entry) = id.and_then(|id| self.by_id.get_mut(id)) {
                 *entry = position as u16;
             }

@@ -334,7 +334,7 @@ impl Core {
             if ended.downloads {
                 self.member_mut(node).facts.written_at = Some(now);
                 if !matches!(ended.outcome, Err(Failure::Aborted(_))) {
-                    self.image_mut().forget_mapping(node, ended.mux.index);
+                    self.image_mut().note_written(node, ended.mux.index);
                 }
             }
             if ended.ticket != FEED {

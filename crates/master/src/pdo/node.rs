@@ -59,6 +59,16 @@ impl Node {
         Ok(())
     }
 
+    /// Whether this master receives or sends a PDO as it was set up here: not once its mapping was written otherwise.
+    pub fn uses_pdo(&self, pdo: PdoId) -> bool {
+        self.network().look(|core| core.image().is_live(self.id(), pdo))
+    }
+
+    /// Receives or sends a PDO again whose mapping was written, and put back as it was.
+    pub fn resume_pdo(&self, pdo: PdoId) {
+        self.network().with_core(|core| core.image_mut().resume(self.id(), pdo));
+    }
+
     fn use_pdo(&self, config: &PdoConfig, cob_id: CobId) {
         let (node, number, map) = (self.id(), config.pdo.number, config.map.clone());
         let id = cob_id.can_id().as_standard().filter(|_| cob_id.is_valid());

@@ -42,10 +42,14 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
     let failed = |step, cause| PdoError::Step { node: node.id(), pdo, step, cause, restored: true };
     let before = snapshot(node, config, &writes).await.map_err(|cause| failed("read what is there", cause))?;
     let cob_id = config.id.map_or(CobId(before.cob_id.0 & !CobId::INVALID), CobId::standard);
+    let was_used = node.uses_pdo(pdo);
     match run(node, config, cob_id, before.cob_id, &writes).await {
         Ok(()) => Ok(cob_id),
         Err(trouble) => {
             let restored = restore(node, config, &before).await.is_ok();
+            if restored && was_used {
+                node.resume_pdo(pdo);
+            }
             Err(match trouble {
                 WriteTrouble::Failed(step, cause) => PdoError::Step { node: node.id(), pdo, step, cause, restored },
                 WriteTrouble::Differs(NamedWrite { step, mux, raw, .. }, found) => {

@@ -271,6 +271,13 @@ fn a_tpdo_whose_mapping_is_written_by_itself_is_not_taken_for_what_it_was() {
         node.write(mux(0x1800, 1), cob_id).await.unwrap();
         network.sleep(Duration::from_millis(50)).await;
         assert_eq!(network.received(node.id(), mux(0x6041, 0)), None);
+        // What is refused (1018h cannot be mapped) is put back, and so is what it was taken for.
+        let before = PdoConfig { map: PdoMap(vec![MappingRecord::from_raw(0x6064_0020)]), ..config.clone() };
+        node.configure_pdo(&before, TimerUnits::of(model("zlac8030l").unwrap())).await.unwrap();
+        let refused = PdoConfig { map: PdoMap(vec![MappingRecord::from_raw(0x1018_0120)]), ..config };
+        node.configure_pdo(&refused, TimerUnits::of(model("zlac8030l").unwrap())).await.unwrap_err();
+        network.sleep(Duration::from_millis(50)).await;
+        assert!(network.received(node.id(), mux(0x6064, 0)).is_some());
         // It is led by what its statusword says.
         drives[0].velocity(Rpm(60.0), MotionOptions::default()).await.unwrap();
         drives[0].stop().await.unwrap();
