@@ -120,6 +120,14 @@ pub fn turning(text: &str) -> Result<Rpm, String> {
     }
 }
 
+/// A speed of the shaft in either direction, other than 0.
+///
+/// # Errors
+/// What is expected.
+pub fn directed(text: &str) -> Result<Rpm, String> {
+    turning(text.strip_prefix('-').unwrap_or(text)).map(|Rpm(rpm)| Rpm(if text.starts_with('-') { -rpm } else { rpm }))
+}
+
 /// Turns of a shaft: `20turn`, `90deg`; a number alone is turns.
 ///
 /// # Errors

@@ -3,6 +3,7 @@
 //! What it waits for beyond the bus (a condition, a time) it asks of the [`HostBoard`], which the stepper of the world
 //! looks at.
 
+mod claims;
 mod measured;
 mod whole;
 
@@ -18,7 +19,7 @@ use canopen::pdo::MappingRecord;
 use canopen::{Mux, NodeId};
 use devices::Description;
 use master::core::PdoMap;
-use master::drive::{MotionReport, Report};
+use master::drive::{self, MotionReport, Report};
 use master::pdo::{PdoConfig, TimerUnits};
 use master::units::Shown;
 use master::{Drive, Network};
@@ -30,6 +31,8 @@ use super::plan::{HostLine, Paths, Sheets, WantedResult};
 use machine::file::Machine;
 use words::object::ObjectArg;
 use words::value::{typed_value, value};
+
+use claims::{Claim, Claimed, Claims};
 
 /// How long a node may take until it says that it has booted, after a reset and at the start.
 const BOOT_PATIENCE: Duration = Duration::from_secs(5);
@@ -46,6 +49,8 @@ pub(super) struct HostBoard {
     pub(super) rows: Vec<Row>,
     /// Hosts that are through.
     pub(super) done: Vec<String>,
+    /// Drives that hosts have for a while.
+    claims: Rc<RefCell<Claims>>,
 }
 
 /// A condition that a host waits for.
@@ -149,7 +154,38 @@ impl HostTask {
         self.machine.models().find(|(node, _)| *node == id).map(|(_, model)| model)
     }
 
+    /// The drives that a command has for itself while it is carried out.
+    fn claim_of(&self, command: &Command) -> (Vec<NodeId>, Claim) {
+        let of = |place: &Place| NodeId::new(place.node).into_iter().collect();
+        let of_group = |nodes: Result<_, _>| nodes.map(|(nodes, _)| nodes).unwrap_or_default();
+        match command {
+            Command::Capture(place, _) => (of(place), Claim::Captured),
+            Command::TestMotion(place, _) | Command::Tune(place, _) => (of(place), Claim::Whole),
+            Command::Group(asked) => (of_group(asked.axes(Some(&self.machine))), Claim::InCycles),
+            Command::Follow(asked) => {
+                let follow = self.paths.get(&asked.file).map(|path| asked.of(path.clone()));
+                (follow.map_or_else(Vec::new, |follow| of_group(follow.axes(Some(&self.machine)))), Claim::InCycles)
+            }
+            Command::Base(_) => {
+                let wheels = self.machine.base.map(|plan| plan.wheels.map(|(node, _)| node));
+                (wheels.into_iter().flatten().collect(), Claim::InCycles)
+            }
+            // Another host may stop what moves.
+            Command::Drive(_, drive::Command::Stop | drive::Command::QuickStop | drive::Command::Disable) => {
+                (Vec::new(), Claim::Command)
+            }
+            // It would store, or lose, what is to be put back.
+            Command::Drive(place, drive::Command::Save | drive::Command::Restore) => (of(place), Claim::Whole),
+            Command::Parameters(node, ..) => (vec![*node], Claim::Whole),
+            Command::Drive(place, _) => (of(place), Claim::Command),
+            Command::Write(node, ..) | Command::Pdo(node, _) => (vec![*node], Claim::Command),
+            _ => (Vec::new(), Claim::Command),
+        }
+    }
+
     async fn perform(&self, line: usize, command: &Command) -> Done {
+        let claims = Rc::clone(&self.shared.borrow().claims);
+        let _claimed = Claimed::of(&claims, self.number, self.claim_of(command))?;
         let done = |seen: &str| Ok((seen.to_owned(), None));
         let network = &self.network;
         match command {

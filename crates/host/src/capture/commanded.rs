@@ -92,6 +92,9 @@ impl Host {
         }
         let span = span_of(&order)?;
         let mut wanted = self.wanted(node, order.period_ms, order.sdo)?;
+        if !order.take.is_empty() && self.is_in_group(node) {
+            return Err(busy("it moves by its PDOs in a group: none of them can be taken"));
+        }
         let take = order.take.iter().map(|text| tpdo_id(text)).collect::<Result<_, _>>();
         wanted.take = take.map_err(|why| ("usage", why))?;
         check_size(order.quantities.len(), 1, &wanted, &span)?;

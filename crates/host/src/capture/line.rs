@@ -11,7 +11,7 @@ use words::failure::{Failure, both};
 use words::time::some_time;
 
 use super::commanded::measurands;
-use super::{Measurand, Restorer, Span, Taken, Trigger, Wanted, not_put_back, with_left};
+use super::{Restorer, Span, Taken, Trigger, Wanted, not_put_back, with_left};
 
 /// Time between two readings, where nothing is said of it.
 const RATE: Duration = Duration::from_millis(1);
@@ -56,13 +56,6 @@ impl FromStr for CaptureLine {
             return Err(format!("it needs a quantity, such as velocity; expected: {}", Self::FORM));
         }
         Ok(Self { quantities, rate, span: Span { duration, trigger, pre_trigger }, take, by_sdo })
-    }
-}
-
-impl Wanted {
-    /// Every millisecond, of a virtual drive that ends with the program: no way back is kept on the disk.
-    pub(crate) const fn of_a_virtual_drive(quantities: Vec<Measurand>, bitrate: Bitrate) -> Self {
-        Self { quantities, period: RATE, bitrate, take: Vec::new(), by_sdo: false, journal: None, on_kept: |_| () }
     }
 }
 

@@ -15,6 +15,7 @@ mod restorer;
 mod rows;
 mod run;
 mod session;
+mod wanted;
 mod ways_back;
 
 pub use crate::network::params::SeenBy;
@@ -28,5 +29,6 @@ pub use quantity::{Form, Quantity, short_names};
 pub use restorer::{Restorer, not_put_back, with_left};
 pub use rows::Trigger;
 pub(crate) use run::{CaptureOutcome, CaptureRun, NamedCapture};
-pub use session::{Running, Span, Taken, Wanted};
+pub use session::{Running, Taken};
+pub use wanted::{Span, Wanted};
 pub use ways_back::{WayBack, WaysBack};

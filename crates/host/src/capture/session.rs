@@ -1,11 +1,9 @@
 //! A capture on a bus: the drive is made to send, what comes is collected, and everything is put back.
 
-use std::path::PathBuf;
 use std::pin::pin;
 use std::time::Duration;
 
-use can::{Bitrate, Instant};
-use canopen::pdo::PdoId;
+use can::Instant;
 use canopen::{Mux, NmtCommand, NmtState, connection_set};
 use futures_util::future::{Either, select};
 use master::core::LoggedFrame;
@@ -20,39 +18,10 @@ use super::measurand::{Measurand, Way};
 use super::plan::{CapturePlan, Request, plan};
 use super::restorer::{Restorer, with_left};
 use super::rows::{Armed, Rows, Trigger};
+use super::wanted::{Span, Wanted};
 use crate::network::params::journal::{Kept, default_path};
 use crate::network::params::{apply_refused, source};
 use machine::parameters::journal::Journal;
-
-/// What is to be captured, and how.
-#[derive(Clone, Debug)]
-pub struct Wanted {
-    /// The quantities.
-    pub quantities: Vec<Measurand>,
-    /// Time between two readings.
-    pub period: Duration,
-    /// Of the bus.
-    pub bitrate: Bitrate,
-    /// TPDOs that are taken although they are in use.
-    pub take: Vec<PdoId>,
-    /// What cannot come by TPDO is read by SDO.
-    pub by_sdo: bool,
-    /// Where the way back is kept meanwhile; `None` on a virtual bus that ends with the program.
-    pub journal: Option<PathBuf>,
-    /// Hears what to do about a journal that stays.
-    pub on_kept: fn(&str),
-}
-
-/// How long a capture is, and when it begins.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Span {
-    /// From its begin, or from its trigger.
-    pub duration: Duration,
-    /// What begins it; at once with `None`.
-    pub trigger: Option<Trigger>,
-    /// What is kept of before the trigger.
-    pub pre_trigger: Duration,
-}
 
 /// A TPDO that brings readings.
 #[derive(Debug)]
@@ -109,34 +78,8 @@ const COLLECT: Duration = Duration::from_millis(10);
 const LOG: usize = 20_000;
 /// How long a drive may take to send its first one, and how long none may come later on.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Shortest time between two readings: more often a bus of 1 Mbit/s carries no frame, the shortest of which has 47 bits (CAN 2.0, 3.2).
-const SHORTEST: Duration = Duration::from_micros(50);
-/// Readings that are kept at most: eight bytes each.
-const MOST: u128 = 100_000_000;
 
 impl Wanted {
-    /// Checks what can be checked without the bus.
-    ///
-    /// # Errors
-    /// Nothing is asked for, or more often than a bus carries frames; it would be more than is kept.
-    pub fn check(&self, span: &Span) -> Result<(), Failure> {
-        if self.quantities.is_empty() {
-            let what = "expected at least one quantity to capture";
-            return Err(Failure::usage(what).next(format!("name some of: {}", super::quantity::short_names())));
-        }
-        if self.period < SHORTEST {
-            let what = format!("expected a period of 50 us or more between two readings, got {:?}", self.period);
-            return Err(Failure::usage(what).next("1 ms is usual"));
-        }
-        let rows = span.duration.saturating_add(span.pre_trigger).as_nanos() / self.period.as_nanos();
-        let readings = rows * self.quantities.len() as u128;
-        if readings > MOST {
-            return Err(Failure::usage(format!("{readings} readings are more than are kept, at most {MOST}"))
-                .next("capture for a shorter time, at a lower rate, or record it: ferrodrive record"));
-        }
-        Ok(())
-    }
-
     /// Makes the drive send what is asked for. What it changes is in the restorer, which is of this drive, from before it is changed: it
     /// leads back from a future that was dropped on the way too.
     ///

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use can::Bitrate;
 use machine::base_drive::finite;
-use machine::group_move::{angle, rate, turning, turns};
+use machine::group_move::{angle, directed, rate, turning, turns};
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use master::units::Angle;
@@ -58,7 +58,7 @@ impl FromStr for TestMotionLine {
         words::line::take(Self::FORM, words, |word, value| {
             match word {
                 "by" => order.by_deg = degrees(value()?)?,
-                "speed" => order.speed_rpm = turning(value()?)?.0,
+                "speed" => order.speed_rpm = directed(value()?)?.0,
                 "frequency" => order.frequency_hz = finite(value()?)?,
                 "to-frequency" => order.to_frequency_hz = finite(value()?)?,
                 "periods" => order.periods = count(value()?)?,
@@ -89,7 +89,8 @@ impl TestMotionLine {
         self.order.motion(CyclicOptions::default())
     }
 
-    /// Moves a virtual drive, captures each run, and puts everything back: the drive is without power then.
+    /// Moves a virtual drive, captures each run, and puts back what the captures have changed: the drive is without power then. Points
+    /// leave the PDOs of their set-points mapped, as a group does.
     ///
     /// # Errors
     /// What stopped it, and what could not be put back.
@@ -122,6 +123,8 @@ mod tests {
             "sine by 0.05turn frequency 2 periods 4 count 2 velocity 90rpm travel 1 capture position,current rate 2ms"
                 .parse()
                 .unwrap();
+        let back: TestMotionLine = "steps speed -30rpm".parse().unwrap();
+        assert_eq!(back.order.speed_rpm, -30.0);
         let Order { shape, by_deg, frequency_hz, periods, count, velocity_rpm, travel_turns, .. } = asked.order;
         assert_eq!((shape, by_deg, frequency_hz, periods), (ShapeName::Sine, 18.0, 2.0, 4));
         assert_eq!((count, velocity_rpm, travel_turns), (2, 90.0, Some(1.0)));
@@ -131,6 +134,8 @@ mod tests {
             ("", "expected: test-motion SHAPE"),
             ("wiggle", "expected a shape of"),
             ("steps by", "'by' has no value"),
+            ("steps speed 0rpm", "above 0"),
+            ("steps speed --30rpm", "above 0"),
             ("steps fast", "'fast' is not a part of test-motion"),
             ("steps speed 90rpm", "a speed of 90 r/min, and 60 r/min are allowed"),
             ("back-and-forth by 4000", "no unit"),

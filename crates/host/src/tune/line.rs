@@ -30,10 +30,11 @@ impl FromStr for TuneLine {
     /// What stands behind `tune`: its [form](TuneLine::FORM).
     fn from_str(text: &str) -> Result<Self, String> {
         let mut asked = Self { order: Order::usual(), current_a: None, apply: false };
+        let mut has_margin = false;
         let order = &mut asked.order;
         words::line::take(Self::FORM, text.split_whitespace(), |word, value| {
             match word {
-                "phase-margin" => order.phase_margin_deg = finite(value()?)?,
+                "phase-margin" => (order.phase_margin_deg, has_margin) = (finite(value()?)?, true),
                 "bandwidth" => order.bandwidth_hz = Some(finite(value()?)?),
                 "loop" => {
                     order.position = match value()? {
@@ -54,6 +55,9 @@ impl FromStr for TuneLine {
             }
             Ok(true)
         })?;
+        if has_margin && asked.order.bandwidth_hz.is_some() {
+            return Err("expected a phase margin or a bandwidth, not both: one follows from the other".to_owned());
+        }
         // What is usual for a model is within its range.
         asked.request((1.0, 1.0)).map(|_| asked).map_err(|failure| failure.one_line())
     }
@@ -101,6 +105,7 @@ mod tests {
             ("loop current", "expected the loop speed or position"),
             ("phase-margin 95", "phase margin"),
             ("speed", "'speed' has no value"),
+            ("bandwidth 20 phase-margin 50", "not both"),
         ] {
             let refused = line.parse::<TuneLine>().unwrap_err();
             assert!(refused.contains(said), "{line}: {refused}");

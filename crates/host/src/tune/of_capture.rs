@@ -155,7 +155,9 @@ pub fn of_capture(
     }
     let inertia_kg_m2 = torque_constant_nm_a.or(of_model).map(|constant| found.inertia_kg_m2(constant));
     if inertia_kg_m2.is_none() {
-        notes.push("the inertia takes the torque per ampere of its motor: --torque-constant".to_owned());
+        notes.push(
+            "the inertia takes the torque per ampere of its motor (--torque-constant of ferrodrive tune)".to_owned(),
+        );
     }
     Ok(CaptureReport {
         node: capture.place.node,

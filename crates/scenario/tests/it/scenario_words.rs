@@ -314,6 +314,28 @@ fn captures_and_test_motions_measure_a_drive_and_put_its_pdos_back() {
     assert!(seen.starts_with("run 1: following error"), "{seen}");
 }
 
+/// A PDO that was received before is received again, where a capture has taken it.
+#[test]
+fn a_capture_gives_back_what_was_received_before_it() {
+    let outcome = run(
+        "[[host]]\ndo = ['4 pdo map tpdo 1 6041 606C type 1', '4 nmt start', 'sync 10ms', '4 capture velocity for 100ms rate 10ms take tpdo1', \
+         'sync 10ms', 'wait 100ms', { do = '4 pdo read 606C', is = 0, tolerance = 5 }]\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
+/// Two hosts on one drive: what would take the other's PDOs is refused, a motion by SDO is not, nor a stop.
+#[test]
+fn a_drive_that_one_host_measures_is_not_measured_or_moved_in_cycles_by_another() {
+    let outcome = run(
+        "[[host]]\nname = 'captures'\ndo = ['4 capture velocity for 5s', { do = '4 read 1A03:00', is = 0 }, '4 test-motion sine by 10deg periods 2']\n\
+         [[host]]\nstart = '2s'\ndo = [{ do = '4 capture current for 100ms', fails = 'node 4 is captured meanwhile' }, \
+         { do = '4 test-motion steps', fails = 'is captured meanwhile' }, { do = '4 tune', fails = 'is captured meanwhile' }, '4 velocity 30rpm', '4 stop', '4 disable', \
+         'wait for 4 velocity > 2 within 10s', { do = '4 velocity 30rpm', fails = 'makes a test motion' }]\n",
+    );
+    assert!(outcome.passed(), "{:#?}", outcome.rows);
+}
+
 /// 0.03 kg m² at the shaft, and the rotor: within 5 %. The drive has the gains then that its row names (201Dh).
 #[test]
 fn gains_are_found_for_a_drive_and_tried() {

@@ -136,7 +136,9 @@ fn identify(
     };
     let capture = recorded.and_then(|recorded| Capture::of_node(&recorded, *node));
     let capture = capture.map_err(|why| ("malformed", format!("{name}: {why}")))?;
-    let model = NodeId::new(capture.place.node).and_then(|node| handle.trace().model(node));
+    // That of this bus may be another one than was captured.
+    let on_bus = |node| handle.trace().model(node);
+    let model = NodeId::new(capture.place.node).and_then(on_bus).filter(|_| capture.model.is_empty());
     of_capture(&capture, None, model).map_err(|failure| refusal(&failure))
 }
 

@@ -7,7 +7,7 @@ use canopen::NodeId;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use host::capture::Wanted;
 use host::test_motion::{Figures, Motion, Order, Run, ShapeName, limits, run, usual_quantities};
-use machine::group_move::{angle, rate, turning, turns_of};
+use machine::group_move::{angle, directed, rate, turning, turns, turns_of};
 use master::Drive;
 use master::units::{Angle, Rpm, parse_duration};
 use recording::{Capture, Kind};
@@ -47,7 +47,7 @@ pub(crate) struct TestMotion {
     #[arg(long, value_name = "ANGLE", value_parser = angle, default_value = "90deg")]
     by: Angle,
     /// Speed of steps, ramp and prbs
-    #[arg(long, value_name = "SPEED", value_parser = turning, default_value = "20rpm")]
+    #[arg(long, value_name = "SPEED", value_parser = directed, default_value = "20rpm", allow_hyphen_values = true)]
     speed: Rpm,
     /// Frequency of sine, the first one of chirp, in Hz
     #[arg(long, value_name = "HZ", default_value = "1")]
@@ -266,12 +266,6 @@ impl TestMotion {
         let row = RunRow { run: number, figures, capture: CaptureRow::new(&capture, None, &ways) };
         (row, capture)
     }
-}
-
-fn turns(text: &str) -> Result<f64, String> {
-    let most = 0.001..=10_000.0;
-    let turns = text.parse().ok().filter(|turns| most.contains(turns));
-    turns.ok_or_else(|| format!("expected turns from {} to {}, got '{text}'", most.start(), most.end()))
 }
 
 /// A capture from a file.
