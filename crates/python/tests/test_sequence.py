@@ -14,9 +14,9 @@ import pytest
 PAGE = pathlib.Path(__file__).parents[2] / "studio" / "page" / "sequence.js"
 
 SHOWN = """
-const { commandLine, python } = await import(process.argv[1]);
+const { commandLine, python, scenario } = await import(process.argv[1]);
 const { steps, bus, models } = JSON.parse(process.argv[2]);
-console.log(JSON.stringify({ shell: commandLine(steps, bus, models), python: python(steps, bus, models) }));
+console.log(JSON.stringify({ shell: commandLine(steps, bus, models), python: python(steps, bus, models), scenario: scenario(steps, models) }));
 """
 
 BASE = {
@@ -33,21 +33,27 @@ def step(word, node=4, after_s=0.0, **more):
     return {"after_s": after_s, "command": {"do": word, **about, **more}}
 
 
-# At its end each wheel is where the last move has brought it.
+# Where it brings the wheels in degrees: 30 r/min for 1.5 s are 270, but for a tenth by ramps that are not equal; a circumference is 2 pi 0.084 m,
+# and a path back and forth ends where it begins. All of it is relative, so that whatever is left out is missed at the end. A ZLAC8030L stops after a second
+# without a frame for it (2000h: quick start guide V1.00, chapter 9).
+HELD_S, JOG_RPM = 1.5, 30
+BY_HOLD, BY_BASE = 6 * JOG_RPM * HELD_S, 360 * 0.1 / (math.tau * 0.084)
+WHERE = {4: BY_HOLD + 90 + BY_HOLD + BY_BASE + 10, 5: -BY_HOLD - BY_BASE - 20}
+
 STEPS = [
     step("nmt", command="start"),
     step("write_parameters", values=[{"object": "6083h:00", "value": "300"}]),
     step("enable"),
-    step("velocity", rpm=30, rpm_per_s=None),
-    step("stop", after_s=0.3),
-    step("move", degrees=90, relative=False, rpm=60),
-    step("capture", after_s=2, quantities=["velocity"], period_ms=2, duration_ms=50, trigger=None, pre_ms=0, sdo=False),
+    step("velocity", rpm=JOG_RPM, rpm_per_s=None),
+    step("stop", after_s=HELD_S),
+    step("move", degrees=90, relative=True, rpm=60),
+    step("capture", after_s=3, quantities=["velocity"], period_ms=2, duration_ms=50, trigger=None, pre_ms=0, sdo=False),
     step("test_motion", motion=MOTION, quantities=["velocity"], capture_ms=None, sdo=False),
-    step("group_jog", None, axes=[{"node": 4, "rpm": 30}, {"node": 5, "rpm": -30}], rpm_per_s=300),
-    step("group_end", None, after_s=0.5),
+    step("group_jog", None, axes=[{"node": 4, "rpm": JOG_RPM}, {"node": 5, "rpm": -JOG_RPM}], rpm_per_s=300),
+    step("group_end", None, after_s=HELD_S),
     step("base_jog", None, **BASE),
     step("group_end", None, after_s=1),
-    step("group_move", None, axes=[{"node": 4, "degrees": 10}, {"node": 5, "degrees": -20}], relative=False, rpm=60, rpm_per_s=600, within_s=None),
+    step("group_move", None, axes=[{"node": 4, "degrees": 10}, {"node": 5, "degrees": -20}], relative=True, rpm=60, rpm_per_s=600, within_s=None),
     step("disable"),
 ]
 
@@ -77,7 +83,20 @@ def test_a_program_made_of_a_sequence_does_what_was_recorded(simulator, tmp_path
     interpreter = [sys.executable] if form == "python" else ["sh"]
     ended = subprocess.run([*interpreter, "-"], input=program, cwd=tmp_path, env=tried, capture_output=True, text=True)
     assert ended.returncode == 0, f"{program}\n{ended.stdout}\n{ended.stderr}"
-    for node, degrees in ((4, 10), (5, -20)):
+    for node, degrees in WHERE.items():
         state = simulator.world(f"{node} get")
-        assert math.degrees(state["shaft_angle_rad"]) == pytest.approx(degrees, abs=2), state
+        # A program ends commands as late as its machine is busy: how far too far is not known. The scenario is held to more, in virtual time.
+        assert math.degrees(state["shaft_angle_rad"]) / degrees > 0.7, state
         assert abs(state["velocity_rpm"]) < 1
+
+
+def test_a_scenario_made_of_a_sequence_does_what_was_recorded(simulator, tmp_path):
+    given = {"steps": STEPS, "bus": "sim", "models": [{"node": node, "model": "zlac8030l"} for node in (4, 5)]}
+    made = subprocess.run(["node", "--input-type=module", "-e", SHOWN, PAGE.as_uri(), json.dumps(given)], check=True, capture_output=True, text=True)
+    program = json.loads(made.stdout)["scenario"]
+    # But for the path, which has no line there, and is back where it began.
+    assert [line for line in program.splitlines() if "left out" in line] == ["    # left out: node 4: a test motion along a path of 3 points"]
+    where = [f"[[expect]]\nafter = 'host'\nthat = '{node} shaft_angle = {math.radians(degrees)} +- {abs(math.radians(0.1 * degrees))}'\n" for node, degrees in WHERE.items()]
+    (tmp_path / "made.toml").write_text(program + "\n".join(["", *where]))
+    ended = subprocess.run([simulator.command_line[0], "run", "made.toml"], cwd=tmp_path, capture_output=True, text=True)
+    assert ended.returncode == 0, f"{program}\n{ended.stdout}\n{ended.stderr}"

@@ -74,13 +74,14 @@ async function posted(path, body) {
   throw new Error(answer ? ((await answer.json().catch(() => null))?.error?.message ?? `status ${answer.status}`) : "the studio does not answer");
 }
 
-/** The files of logs that were read, by the ids of their captures: these have what frames carry, a log has when they were sampled. */
-const logs = new Map();
+/** The files of logs that were read, by their captures: these have what frames carry, a log has when it was sampled. Until the page is loaded anew. */
+const logs = new WeakMap();
 
 /** What a capture shows of a drive: frequency response, masses, speed loop. `node` is taken where it has several. Throws what it lacks. */
 export async function identified(capture, node) {
   const nodes = new Set(capture.columns.map((column) => column.node));
-  const log = logs.get(capture.id);
+  const log = logs.get(capture);
+  if (!log && capture.columns.every(({ field }) => field.includes(":"))) throw new Error("it has the objects of a log without the times of its SYNC: load the log again, and identify from that");
   const name = log?.name ?? "capture.csv";
   const query = new URLSearchParams({ name, ...(nodes.has(node) ? { node } : {}) });
   return (await posted(`/api/recording/identified?${query}`, log ?? recordOf({ columns: capture.columns, marks: [], about: capture }))).json();
@@ -91,7 +92,7 @@ export async function readRecording(file) {
   const body = await (await posted(`/api/recording?${new URLSearchParams({ name: file.name })}`, file)).json();
   if (!body.columns.length) throw new Error(`${file.name} has no values${body.remark ? `: ${body.remark}` : ""}`);
   const capture = captureOf(file.name, body);
-  if (!/\.(csv|mcap)$/i.test(file.name)) logs.set(capture.id, file);
+  if (!/\.(csv|mcap)$/i.test(file.name)) logs.set(capture, file);
   return { capture, remark: body.remark };
 }
 

@@ -17,6 +17,15 @@ const isOfGroup = (command) => command.do === "group_move" || heldNodes(command)
 const targets = (axes) => axes.map(({ node, degrees }) => `${node}=${figure(degrees)}deg`).join(" ");
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
+/** Quantities that a drive has: what is true of a virtual one is known to the program alone that has its world. */
+const measured = (quantities) => quantities.filter((name) => !name.startsWith("true_"));
+
+/** The form of a capture, or why there is none: one that is armed would wait for what only comes behind it. */
+function captureUnless(command, form) {
+  const why = command.trigger ? "it would wait for what comes behind it" : measured(command.quantities).length ? null : "what is true of a virtual drive is known to the studio alone";
+  return why === null ? form(command) : [LEFT_OUT(`node ${command.node}: ${ROWS.capture.shown(command)}: ${why}`)];
+}
+
 /** The options of a test motion: of its fields those that its shape has, and its limits where they are given. */
 function testMotionOptions({ motion, quantities, capture_ms }) {
   const has = SHAPES.find(({ value }) => value === motion.shape).fields;
@@ -34,7 +43,7 @@ function testMotionOptions({ motion, quantities, capture_ms }) {
     ...of("travel_turns", "travel", figure),
     ...of("following_error_deg", "following-error", (value) => `${figure(value)}deg`),
     ...of("period_ms", "period", ms),
-    ...(quantities.length ? [["capture", quantities.join()]] : []),
+    ...(measured(quantities).length ? [["capture", measured(quantities).join()]] : []),
     ...(capture_ms === null ? [] : [["rate", ms(capture_ms)]]),
   ];
 }
@@ -47,7 +56,7 @@ function testMotionArguments({ motion, quantities, capture_ms }) {
   const of = (name, argument, form = figure) => (has.includes(name) || !(name in FIELD_OF_SHAPE) ? (motion[name] === null ? [] : [`${argument}=${form(motion[name])}`]) : []);
   return [
     JSON.stringify(motion.shape),
-    ...quantities.map((name) => JSON.stringify(name)),
+    ...measured(quantities).map((name) => JSON.stringify(name)),
     ...of("by_deg", "by"),
     ...of("speed_rpm", "speed_rpm"),
     ...of("frequency_hz", "frequency"),
@@ -111,9 +120,10 @@ const ROWS = {
   quick_stop: { shown: () => "Quick stop", line: () => "quick-stop", cli: ({ node }) => `quick-stop ${node}`, python: () => "quick_stop()" },
   velocity: {
     shown: ({ rpm }) => `Turn at ${figure(rpm)} r/min`,
-    line: ({ rpm, rpm_per_s: ramp }) => `velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`,
-    cli: ({ node, rpm, rpm_per_s: ramp }) => `velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} --no-wait`,
-    python: ({ rpm, rpm_per_s: ramp }) => `velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`,
+    // As the studio does: a drive that watches its host is kept content while it turns, and stops when the program is gone.
+    line: ({ rpm, rpm_per_s: ramp }) => ["guard", `velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`],
+    cli: ({ node, rpm, rpm_per_s: ramp, for_s }) => `velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} ${for_s ? `--for ${ms(for_s * 1e3)}` : "--no-wait"}`,
+    python: ({ node, rpm, rpm_per_s: ramp }) => [`node_${node}.guard()`, `node_${node}.velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`],
   },
   move: {
     shown: ({ degrees, relative }) => `Move ${relative ? "by" : "to"} ${figure(degrees)}°`,
@@ -151,9 +161,14 @@ const ROWS = {
   },
   capture: {
     shown: ({ quantities, period_ms, duration_ms, trigger }) => `Capture ${quantities.join(", ")} every ${ms(period_ms)} for ${figure(duration_ms / 1e3)} s${trigger ? ` from ${trigger}` : ""}`,
-    line: ({ quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture ${quantities.join(" ")} rate ${ms(period_ms)}${trigger ? ` trigger ${trigger.replaceAll(" ", "")}${pre_ms ? ` pre ${ms(pre_ms)}` : ""}` : ""}${take.map((pdo) => ` take ${pdo}`).join("")}${sdo ? " sdo" : ""} for ${ms(duration_ms)}`,
-    cli: ({ node, quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture ${node} ${quantities.join(" ")} --for ${ms(duration_ms)} --rate ${ms(period_ms)}${trigger ? ` --trigger ${quoted(trigger)}${pre_ms ? ` --pre ${ms(pre_ms)}` : ""}` : ""}${take.map((pdo) => ` --take ${pdo}`).join("")}${sdo ? " --sdo" : ""} -o node${node}.mcap  # waits for its end`,
-    python: ({ quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo }) => `capture(${quantities.map((name) => JSON.stringify(name)).join(", ")}, duration=${figure(duration_ms / 1e3)}, period=${figure(period_ms / 1e3)}${trigger ? `, trigger=${JSON.stringify(trigger)}${pre_ms ? `, pre_trigger=${figure(pre_ms / 1e3)}` : ""}` : ""}${take.length ? `, take=${JSON.stringify(take)}` : ""}${sdo ? ", sdo=True" : ""})  # waits for its end`,
+    line: (command) => captureUnless(command, ({ quantities, period_ms, duration_ms, take = [], sdo }) => `capture ${measured(quantities).join(" ")} rate ${ms(period_ms)}${take.map((pdo) => ` take ${pdo}`).join("")}${sdo ? " sdo" : ""} for ${ms(duration_ms)}`),
+    // One that is armed waits beside what comes behind it.
+    cli: (command) =>
+      captureUnless({ ...command, trigger: null }, () => {
+        const { node, quantities, period_ms, duration_ms, trigger, pre_ms, take = [], sdo } = command;
+        return `capture ${node} ${measured(quantities).join(" ")} --for ${ms(duration_ms)} --rate ${ms(period_ms)}${trigger ? ` --trigger ${quoted(trigger)}${pre_ms ? ` --pre ${ms(pre_ms)}` : ""}` : ""}${take.map((pdo) => ` --take ${pdo}`).join("")}${sdo ? " --sdo" : ""} -o node${node}.mcap${trigger ? " &" : "  # waits for its end"}`;
+      }),
+    python: (command) => captureUnless(command, ({ quantities, period_ms, duration_ms, take = [], sdo }) => `capture(${measured(quantities).map((name) => JSON.stringify(name)).join(", ")}, duration=${figure(duration_ms / 1e3)}, period=${figure(period_ms / 1e3)}${take.length ? `, take=${JSON.stringify(take)}` : ""}${sdo ? ", sdo=True" : ""})  # waits for its end`),
   },
   test_motion: {
     shown: ({ motion }) => `Test motion ${motion.shape}, ${motion.count} ${motion.count === 1 ? "run" : "runs"}`,
@@ -311,8 +326,32 @@ function withTrials(steps) {
   return said;
 }
 
+/** A capture that a program waits for takes its time from the pause behind it. */
+const withoutWaits = (steps) =>
+  steps.map((step, at) => {
+    const { do: word, duration_ms } = steps[at - 1]?.command ?? {};
+    return word === "capture" && !steps[at - 1].command.trigger ? { ...step, after_s: Math.max(0, step.after_s - duration_ms / 1e3) } : step;
+  });
+
 /** As programs say it: where one command is several of a page. */
-const asSaid = (steps) => withTimes(withTrials(steps), isReplaced);
+const asSaid = (steps) => withTimes(withoutWaits(withTrials(steps)), isReplaced);
+
+/** In a shell each command is a program of its own, and a drive that watches it stops when it is gone: it turns until the stop that follows. */
+function withTurns(steps) {
+  const said = steps.map((step) => ({ ...step }));
+  said.forEach((step, at) => {
+    const next = said[at + 1];
+    const ends = next && ["stop", "quick_stop"].includes(next.command.do) && next.command.node === step.command.node;
+    if (step.command.do !== "velocity" || !ends || next.after_s < SHORTEST_S) return;
+    step.command = { ...step.command, for_s: rounded(next.after_s) };
+    next.after_s = 0;
+  });
+  return said;
+}
+
+/** What a scenario may take at most: the pauses, and far more than each command. */
+const AT_MOST_S = { tune: 200, test_motion: 200, capture: 10, home: 60 };
+const limitOf = (steps) => Math.ceil(60 + steps.reduce((sum, { after_s, command: { do: word, motion, duration_ms = 0, held_s = 0 } }) => sum + after_s + held_s + duration_ms / 1e3 + (AT_MOST_S[word] ?? 10) * (motion?.count ?? 1), 0));
 /** Another command to one of its drives ends a held motion. */
 const isReplaced = (held, command) => !LEAVE_MOTION.includes(command.do) && !isHeld(command) && nodesOf(command).some((node) => nodesOf(held).includes(node));
 
@@ -322,7 +361,7 @@ const isVirtual = (bus) => /^sim(:|$)/.test(bus);
 /** As commands of a shell; `bus` as the studio has it, `models` is the model of each node. */
 export function commandLine(steps, bus, models = []) {
   const named = new Map(modelsOf(steps, models).map(({ node, model }) => [node, model]));
-  const lines = asSaid(steps).flatMap((step, at) => {
+  const lines = withTurns(asSaid(steps)).flatMap((step, at) => {
     const pause = pauseOf(step, at);
     const said = ROWS[step.command.do].cli(step.command, named);
     return [...(pause === null ? [] : [`sleep ${pause}`]), ...(Array.isArray(said) ? said : [`ferrodrive ${said}`])];
@@ -331,7 +370,8 @@ export function commandLine(steps, bus, models = []) {
   const export_ = isVirtual(bus) ? `export FERRODRIVE_BUS=socketcand://127.0.0.1:29536/can0  # ferrodrive sim${bus === "sim" ? "" : ` --machine ${quoted(bus.slice("sim:".length))}`} --serve socketcand://127.0.0.1:29536` : `export FERRODRIVE_BUS='${bus}'`;
   const known = [...named].map(([node, model]) => ` --model ${node}=${model}`);
   const own = known.length ? [`ferrodrive() { command ferrodrive${known.join("")} "$@"; }`] : [];
-  return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ""].join("\n");
+  const waits = lines.some((line) => line.endsWith(" &")) ? ["wait"] : [];
+  return ["#!/bin/sh", "set -e", export_, ...own, ...lines, ...waits, ""].join("\n");
 }
 
 /** As a program in Python. */
@@ -363,5 +403,5 @@ export function scenario(steps, models) {
     const own = said.map((text) => (text.startsWith("#") ? `    ${text}` : `    ${JSON.stringify(isOfGroup(step.command) ? text : `${step.command.node} ${text}`)},`));
     return [...(pause === null ? [] : [`    "wait ${pause}s",`]), ...own];
   });
-  return ['title = "Recorded in the studio"', "", "[machine]", "drive = [", ...drives, "]", ...bases.slice(0, 1).map((base) => `base = { ${base} }`), "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");
+  return ['title = "Recorded in the studio"', `limit = "${limitOf(asSaid(steps))}s"`, "", "[machine]", "drive = [", ...drives, "]", ...bases.slice(0, 1).map((base) => `base = { ${base} }`), "", "[[host]]", "do = [", ...lines, "]", ""].join("\n");
 }

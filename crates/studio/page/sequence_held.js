@@ -61,19 +61,24 @@ export const HELD_ROWS = {
   group_jog: {
     shown: (command) => `Turn together at ${command.axes.map(({ rpm }) => figure(rpm)).join(", ")} r/min${time(command)}`,
     line: ({ axes, rpm_per_s: ramp, held_s }) => [
+      ...axes.map(({ node }) => `${node} guard`),
       ...axes.map(({ node, rpm }) => `${node} velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`),
       `wait ${ms(held_s * 1e3)}`,
       ...axes.map(({ node }) => `${node} stop`),
+      ...axes.map(({ node }) => `${node} disable`),
     ],
     cli: ({ axes, rpm_per_s: ramp, held_s }) => [
-      ...axes.map(({ node, rpm }) => `ferrodrive velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} --no-wait`),
-      `sleep ${figure(held_s)}`,
-      ...axes.map(({ node }) => `ferrodrive stop ${node}`),
+      // Each is a program that the drive watches, for as long as it turns.
+      ...axes.map(({ node, rpm }) => `ferrodrive velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} --for ${ms(held_s * 1e3)} & node_${node}=$!`),
+      ...axes.map(({ node }) => `wait "$node_${node}"`),
+      ...axes.map(({ node }) => `ferrodrive disable ${node}`),
     ],
     python: ({ axes, rpm_per_s: ramp, held_s }) => [
+      ...axes.map(({ node }) => `node_${node}.guard()`),
       ...axes.map(({ node, rpm }) => `node_${node}.velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`),
       `network.sleep(${figure(held_s)})`,
       ...axes.map(({ node }) => `node_${node}.stop()`),
+      ...axes.map(({ node }) => `node_${node}.disable()`),
     ],
   },
   base_jog: {

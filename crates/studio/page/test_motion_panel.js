@@ -26,7 +26,7 @@ function fieldOf(name, { label, unit, usual, title, quantity, rate, optional }, 
     const { input, row, read, update } = unitField(id, label, quantity, value, { optional, rate });
     Object.assign(input, { onchange, placeholder: usual === "" ? "–" : "" });
     row.title = title ?? "";
-    return { row, update, text: () => (read() === null ? "" : String(read())) };
+    return { row, update, text: () => (input.validity.badInput ? "no number" : read() === null ? "" : String(read())) };
   }
   const input = h("input", { id, value, class: "short", inputmode: "decimal", spellcheck: "false", "aria-label": unit ? `${label} in ${unit}` : label, placeholder: usual === "" ? "–" : "", onchange });
   return { row: h("label", { title: title ?? "" }, `${label} `, input, unit ? ` ${unit}` : ""), update: () => {}, text: () => input.value };

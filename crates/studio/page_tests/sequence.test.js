@@ -102,8 +102,9 @@ END
 ferrodrive params apply 4 node4.toml
 ferrodrive save 4
 sleep 1
-ferrodrive capture 4 velocity 6041h:00 --for 2000ms --rate 1ms --trigger 'velocity>10' --pre 50ms -o node4.mcap  # waits for its end
+ferrodrive capture 4 velocity 6041h:00 --for 2000ms --rate 1ms --trigger 'velocity>10' --pre 50ms -o node4.mcap &
 ferrodrive test-motion 4 sine --by 20deg --frequency 1 --periods 3 --count 2 --velocity 60rpm --travel 2 --following-error 72deg --period 10ms --capture velocity --rate 2ms
+wait
 `,
   );
   const path = { after_s: 0, command: { ...measured[4].command, motion: { ...motion, shape: "path", path: [[0, 0], [1, 90]] } } };
@@ -119,11 +120,25 @@ test("and those of Python and of a scenario", () => {
     '        file.write("[values]\\n\\"2008:00\\" = \\"60rpm\\"\\n\\"6083:00\\" = \\"\\\\\\"5\\\\\\"\\"\\n")',
     '    network.params(4).apply("node4.toml")',
     "    node_4.save()",
-    '    node_4.capture("velocity", "6041h:00", duration=2, period=0.001, trigger="velocity>10", pre_trigger=0.05)  # waits for its end',
+    "    # left out: node 4: Capture velocity, 6041h:00 every 1ms for 2 s from velocity>10: it would wait for what comes behind it",
     '    node_4.test_motion("sine", "velocity", by=20, frequency=1, periods=3, count=2, velocity_rpm=60, travel_turns=2, following_error=72, period=0.01, capture_period=0.002)',
   ]) assert.ok(text.includes(`${line}\n`), line);
   const lines = scenario(measured, [{ node: 4, model: "zlac8030l" }]);
-  for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    "4 save",', '    "4 capture velocity 6041h:00 rate 1ms trigger velocity>10 pre 50ms for 2000ms",', '    "4 test-motion sine by 20deg frequency 1 periods 3 count 2 velocity 60rpm travel 2 following-error 72deg period 10ms capture velocity rate 2ms",']) assert.ok(lines.includes(`${line}\n`), line);
+  for (const line of ['    "4 nmt start",', '    "4 write 2008:00 60rpm",', '    "4 save",', '    "4 test-motion sine by 20deg frequency 1 periods 3 count 2 velocity 60rpm travel 2 following-error 72deg period 10ms capture velocity rate 2ms",']) assert.ok(lines.includes(`${line}\n`), line);
+});
+
+test("a capture takes its time from the pause behind it, and what only the studio knows is left out", () => {
+  const capture = { do: "capture", node: 4, quantities: ["velocity", "true_winding"], period_ms: 1, duration_ms: 2000, trigger: null, pre_ms: 0, take: ["tpdo1"], sdo: true };
+  const steps = [{ after_s: 0, command: capture }, { after_s: 3, command: { do: "velocity", node: 4, rpm: 30, rpm_per_s: null } }, { after_s: 2.5, command: { do: "stop", node: 4 } }];
+  // A program that has ended is not there to keep its drive turning.
+  assert.match(commandLine(steps, "can0"), /capture 4 velocity --for 2000ms --rate 1ms --take tpdo1 --sdo -o node4.mcap {2}# waits for its end\nsleep 1\nferrodrive velocity 4 30rpm --for 2500ms\nferrodrive stop 4\n$/);
+  assert.match(python(steps, "can0"), /node_4.capture\("velocity", duration=2, period=0.001, take=\["tpdo1"\], sdo=True\) {2}# waits for its end\n {4}network.sleep\(1\)\n/);
+  const text = scenario(steps, [{ node: 4, model: "zlac8030l" }]);
+  assert.match(text, /"4 capture velocity rate 1ms take tpdo1 sdo for 2000ms",\n {4}"wait 1s",\n {4}"4 guard",\n {4}"4 velocity 30rpm no-wait",\n {4}"wait 2.5s",/);
+  const limit = Number(/^limit = "(\d+)s"$/m.exec(text)[1]);
+  assert.ok(limit >= 60 + 2 + 1 + 2.5, text);
+  const truth = scenario([{ after_s: 0, command: { ...capture, quantities: ["true_winding"] } }], []);
+  assert.match(truth, /# left out: node 4: Capture true_winding .*: what is true of a virtual drive is known to the studio alone$/m);
 });
 
 const together = [
@@ -249,12 +264,12 @@ test("a held base has its time in each form, with the machine that it takes", ()
   assert.equal(shownStep(held[1], 1), "+1.50 s End of the held motion");
   const models = [4, 5].map((node) => ({ node, model: "zlac8030l" }));
   const shell = commandLine(held, "can0", models);
-  for (const line of ["wheels = [4, 5]", "turns = [1, -1]", "wheel_m_s = 0.3", "angular_rad_s = 1.5", "ferrodrive drive-base base.toml --linear 0.1 --angular 0.25 --for 1500ms", "sleep 2", "ferrodrive velocity 1 30rpm --no-wait\nferrodrive velocity 2 -15rpm --no-wait\nsleep 0.7\nferrodrive stop 1\nferrodrive stop 2"]) assert.ok(shell.includes(`${line}\n`), line);
+  for (const line of ["wheels = [4, 5]", "turns = [1, -1]", "wheel_m_s = 0.3", "angular_rad_s = 1.5", "ferrodrive drive-base base.toml --linear 0.1 --angular 0.25 --for 1500ms", "sleep 2", "ferrodrive velocity 1 30rpm --for 700ms & node_1=$!\nferrodrive velocity 2 -15rpm --for 700ms & node_2=$!\nwait \"$node_1\"\nwait \"$node_2\"\nferrodrive disable 1\nferrodrive disable 2"]) assert.ok(shell.includes(`${line}\n`), line);
   assert.match(commandLine(held, "can0"), /^# left out: nodes 4, 5: .*the models of its wheels are not known$/m);
   const program = python(held, "can0", models);
-  for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)", "    node_1.velocity(30, wait=False)\n    node_2.velocity(-15, wait=False)\n    network.sleep(0.7)\n    node_1.stop()\n    node_2.stop()"]) assert.ok(program.includes(`${line}\n`), line);
+  for (const line of ['    with network.base((4, "zlac8030l"), (5, "zlac8030l"), turns=(1, -1), wheel_base_m=0.4, wheel_radius_m=0.084, linear_m_s=0.3, angular_rad_s=1.5, wheel_m_s=0.3, wheel_m_s2=0.5) as base:', "        base.drive(0.1, 0.25, seconds=1.5)", "    node_1.velocity(30, wait=False)\n    node_2.velocity(-15, wait=False)\n    network.sleep(0.7)\n    node_1.stop()\n    node_2.stop()\n    node_1.disable()\n    node_2.disable()"]) assert.ok(program.includes(`${line}\n`), line);
   const run = scenario([...held, { after_s: 1, command: { ...base, wheels: [5, 4] } }], models);
-  for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', '    "1 velocity 30rpm no-wait",\n    "2 velocity -15rpm no-wait",\n    "wait 700ms",\n    "1 stop",\n    "2 stop",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
+  for (const line of ['    "drive-base linear 0.1 angular 0.25 for 1500ms",', '    "1 velocity 30rpm no-wait",\n    "2 velocity -15rpm no-wait",\n    "wait 700ms",\n    "1 stop",\n    "2 stop",\n    "1 disable",\n    "2 disable",', "base = { wheels = [4, 5], turns = [1, -1], wheel_base_m = 0.4, wheel_radius_m = 0.084, linear_m_s = 0.3, angular_rad_s = 1.5, wheel_m_s = 0.3, wheel_m_s2 = 0.5 }"]) assert.ok(run.includes(`${line}\n`), line);
   assert.match(run, /^ {4}# left out: nodes 5, 4: .*: another base$/m);
   // Something else to one of its drives ends it; what another drive gets meanwhile does not.
   const next = (command) => commandLine([held[0], { after_s: 1, command: { do: "reset_fault", node: 4 } }, { after_s: 1, command }, { after_s: 3, command: { do: "enable", node: 4 } }], "can0", models);
