@@ -349,7 +349,7 @@ async fn a_drive_is_found_enabled_moved_and_stopped() {
 async fn a_sequence_is_played_and_runs_as_a_scenario(stage: &Stage) {
     stage.click("#sequence-record").await;
     stage.says(".sequence li:nth-child(2)", "node 4: Move by 90°").await;
-    stage.says("#sequence-text", "ferrodrive velocity 4 60rpm --no-wait").await;
+    stage.says("#sequence-text", "ferrodrive velocity 4 60rpm --for ").await;
     stage.choose("#sequence-form", "python").await;
     stage.says("#sequence-text", "node_4.move(90, relative=True, wait=False)").await;
     stage.choose("#sequence-form", "scenario").await;
