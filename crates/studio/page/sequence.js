@@ -3,7 +3,7 @@
 //
 // A step is `{ after_s, command }`: the time since the step before, and what was sent, which is about one node, or about those of its axes.
 
-import { HELD_ROWS, HELD_WHOLE, LEFT_OUT, baseOf, figure, heldNodes, isHeld, ms, withTimes } from "./sequence_held.js";
+import { BY_RAMP, HELD_ROWS, HELD_WHOLE, LEFT_OUT, baseOf, figure, heldNodes, isHeld, ms, withTimes } from "./sequence_held.js";
 import { SHAPES } from "./test_motion.js";
 
 /** `2008:00`, as files and command lines write `2008h:00`. */
@@ -121,9 +121,9 @@ const ROWS = {
   velocity: {
     shown: ({ rpm }) => `Turn at ${figure(rpm)} r/min`,
     // As the studio does: a drive that watches its host is kept content while it turns, and stops when the program is gone.
-    line: ({ rpm, rpm_per_s: ramp }) => ["guard", `velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`],
-    cli: ({ node, rpm, rpm_per_s: ramp, for_s }) => `velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} ${for_s ? `--for ${ms(for_s * 1e3)}` : "--no-wait"}`,
-    python: ({ node, rpm, rpm_per_s: ramp }) => [`node_${node}.guard()`, `node_${node}.velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`],
+    line: ({ rpm, rpm_per_s: ramp }) => ["guard", `velocity ${figure(rpm)}rpm${BY_RAMP.line(ramp)} no-wait`],
+    cli: ({ node, rpm, rpm_per_s: ramp, for_s }) => `velocity ${node} ${figure(rpm)}rpm${BY_RAMP.cli(ramp)} ${for_s ? `--for ${ms(for_s * 1e3)}` : "--no-wait"}`,
+    python: ({ node, rpm, rpm_per_s: ramp }) => [`node_${node}.guard()`, `node_${node}.velocity(${figure(rpm)}${BY_RAMP.python(ramp)}, wait=False)`],
   },
   move: {
     shown: ({ degrees, relative }) => `Move ${relative ? "by" : "to"} ${figure(degrees)}°`,

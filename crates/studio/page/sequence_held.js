@@ -7,6 +7,13 @@ export const ms = (value) => `${figure(value)}ms`;
 /** Where a form has no word for a command, it has a line for people. */
 export const LEFT_OUT = (what) => `# left out: ${what}`;
 
+/** A speed that is reached and left by a ramp of its own, in each form; nothing without one. */
+export const BY_RAMP = {
+  line: (ramp) => (ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""),
+  cli: (ramp) => (ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""),
+  python: (ramp) => (ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""),
+};
+
 /** Whether the page has to hold it. */
 export const isHeld = ({ do: word }) => word === "group_jog" || word === "base_jog";
 
@@ -62,20 +69,20 @@ export const HELD_ROWS = {
     shown: (command) => `Turn together at ${command.axes.map(({ rpm }) => figure(rpm)).join(", ")} r/min${time(command)}`,
     line: ({ axes, rpm_per_s: ramp, held_s }) => [
       ...axes.map(({ node }) => `${node} guard`),
-      ...axes.map(({ node, rpm }) => `${node} velocity ${figure(rpm)}rpm${ramp ? ` acceleration ${figure(ramp)}rpm/s deceleration ${figure(ramp)}rpm/s` : ""} no-wait`),
+      ...axes.map(({ node, rpm }) => `${node} velocity ${figure(rpm)}rpm${BY_RAMP.line(ramp)} no-wait`),
       `wait ${ms(held_s * 1e3)}`,
       ...axes.map(({ node }) => `${node} stop`),
       ...axes.map(({ node }) => `${node} disable`),
     ],
     cli: ({ axes, rpm_per_s: ramp, held_s }) => [
       // Each is a program that the drive watches, for as long as it turns.
-      ...axes.map(({ node, rpm }) => `ferrodrive velocity ${node} ${figure(rpm)}rpm${ramp ? ` --acceleration ${figure(ramp)}rpm/s --deceleration ${figure(ramp)}rpm/s` : ""} --for ${ms(held_s * 1e3)} & node_${node}=$!`),
+      ...axes.map(({ node, rpm }) => `ferrodrive velocity ${node} ${figure(rpm)}rpm${BY_RAMP.cli(ramp)} --for ${ms(held_s * 1e3)} & node_${node}=$!`),
       ...axes.map(({ node }) => `wait "$node_${node}"`),
       ...axes.map(({ node }) => `ferrodrive disable ${node}`),
     ],
     python: ({ axes, rpm_per_s: ramp, held_s }) => [
       ...axes.map(({ node }) => `node_${node}.guard()`),
-      ...axes.map(({ node, rpm }) => `node_${node}.velocity(${figure(rpm)}${ramp ? `, acceleration_rpm_s=${figure(ramp)}, deceleration_rpm_s=${figure(ramp)}` : ""}, wait=False)`),
+      ...axes.map(({ node, rpm }) => `node_${node}.velocity(${figure(rpm)}${BY_RAMP.python(ramp)}, wait=False)`),
       `network.sleep(${figure(held_s)})`,
       ...axes.map(({ node }) => `node_${node}.stop()`),
       ...axes.map(({ node }) => `node_${node}.disable()`),
