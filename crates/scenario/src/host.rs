@@ -154,32 +154,35 @@ impl HostTask {
         self.machine.models().find(|(node, _)| *node == id).map(|(_, model)| model)
     }
 
-    /// The drives that a command has for itself while it is carried out.
-    fn claim_of(&self, command: &Command) -> (Vec<NodeId>, Claim) {
+    /// The drives that a command concerns, and what it has them for while it is carried out.
+    fn claim_of(&self, command: &Command) -> (Vec<NodeId>, Option<Claim>) {
         let of = |place: &Place| NodeId::new(place.node).into_iter().collect();
         let of_group = |nodes: Result<_, _>| nodes.map(|(nodes, _)| nodes).unwrap_or_default();
         match command {
-            Command::Capture(place, _) => (of(place), Claim::Captured),
-            Command::TestMotion(place, _) | Command::Tune(place, _) => (of(place), Claim::Whole),
-            Command::Group(asked) => (of_group(asked.axes(Some(&self.machine))), Claim::InCycles),
+            Command::Capture(place, _) => (of(place), Some(Claim::Captured)),
+            Command::TestMotion(place, _) | Command::Tune(place, _) => (of(place), Some(Claim::Whole)),
+            Command::Group(asked) => (of_group(asked.axes(Some(&self.machine))), Some(Claim::InCycles)),
             Command::Follow(asked) => {
                 let follow = self.paths.get(&asked.file).map(|path| asked.of(path.clone()));
-                (follow.map_or_else(Vec::new, |follow| of_group(follow.axes(Some(&self.machine)))), Claim::InCycles)
+                (
+                    follow.map_or_else(Vec::new, |follow| of_group(follow.axes(Some(&self.machine)))),
+                    Some(Claim::InCycles),
+                )
             }
             Command::Base(_) => {
                 let wheels = self.machine.base.map(|plan| plan.wheels.map(|(node, _)| node));
-                (wheels.into_iter().flatten().collect(), Claim::InCycles)
+                (wheels.into_iter().flatten().collect(), Some(Claim::InCycles))
             }
             // Another host may stop what moves.
             Command::Drive(_, drive::Command::Stop | drive::Command::QuickStop | drive::Command::Disable) => {
-                (Vec::new(), Claim::Command)
+                (Vec::new(), None)
             }
             // It would store, or lose, what is to be put back.
-            Command::Drive(place, drive::Command::Save | drive::Command::Restore) => (of(place), Claim::Whole),
-            Command::Parameters(node, ..) => (vec![*node], Claim::Whole),
-            Command::Drive(place, _) => (of(place), Claim::Command),
-            Command::Write(node, ..) | Command::Pdo(node, _) => (vec![*node], Claim::Command),
-            _ => (Vec::new(), Claim::Command),
+            Command::Drive(place, drive::Command::Save | drive::Command::Restore) => (of(place), Some(Claim::Whole)),
+            Command::Parameters(node, ..) => (vec![*node], Some(Claim::Whole)),
+            Command::Drive(place, _) => (of(place), None),
+            Command::Write(node, ..) | Command::Pdo(node, _) => (vec![*node], None),
+            _ => (Vec::new(), None),
         }
     }
 

@@ -11,7 +11,7 @@ use words::failure::{Failure, both};
 use words::time::some_time;
 
 use super::commanded::measurands;
-use super::{Restorer, Span, Taken, Trigger, Wanted, not_put_back, with_left};
+use super::{Restorer, Span, Taken, Trigger, Wanted};
 
 /// Time between two readings, where nothing is said of it.
 const RATE: Duration = Duration::from_millis(1);
@@ -70,18 +70,12 @@ impl CaptureLine {
     /// What cannot be had, and what could not be put back.
     pub async fn carry_out(&self, drive: &Drive, bitrate: Bitrate) -> Result<Taken, Failure> {
         let quantities = measurands(drive, None, &self.quantities).await?;
-        let wanted = Wanted {
-            period: self.rate,
-            take: self.take.clone(),
-            by_sdo: self.by_sdo,
-            ..Wanted::of_a_virtual_drive(quantities, bitrate)
-        };
+        let (take, by_sdo) = (self.take.clone(), self.by_sdo);
+        let wanted = Wanted { take, by_sdo, ..Wanted::of_a_virtual_drive(quantities, self.rate, bitrate) };
         wanted.check(&self.span)?;
         let restorer = Restorer::of(drive);
         let taken = async { wanted.begin(drive, &restorer).await?.next(&self.span).await }.await;
-        let left = restorer.restore().await;
-        let back = not_put_back(drive.node().id(), &left).map_or(Ok(()), |failure| Err(with_left(failure, &left)));
-        both(taken, back)
+        both(taken, restorer.restored().await)
     }
 }
 

@@ -171,6 +171,15 @@ impl Restorer {
         left
     }
 
+    /// [`Self::restore`], where what could not be put back is a failure.
+    ///
+    /// # Errors
+    /// `not_put_back` with what was not, and why.
+    pub(crate) async fn restored(&self) -> Result<(), Failure> {
+        let left = self.restore().await;
+        not_put_back(self.id(), &left).map_or(Ok(()), |failure| Err(with_left(failure, &left)))
+    }
+
     /// The drive stands without power, and nothing is sent for its motion any more; why that was not seen.
     async fn come_to_rest(&self, motion: Moving) -> Vec<String> {
         let (network, id) = (self.node().network(), self.node().id());

@@ -45,17 +45,9 @@ pub struct Span {
 }
 
 impl Wanted {
-    /// Every millisecond, of a virtual drive that ends with the program: no way back is kept on the disk.
-    pub(crate) const fn of_a_virtual_drive(quantities: Vec<Measurand>, bitrate: Bitrate) -> Self {
-        Self {
-            quantities,
-            period: Duration::from_millis(1),
-            bitrate,
-            take: Vec::new(),
-            by_sdo: false,
-            journal: None,
-            on_kept: |_| (),
-        }
+    /// Of a virtual drive that ends with the program: no way back is kept on the disk.
+    pub(crate) const fn of_a_virtual_drive(quantities: Vec<Measurand>, period: Duration, bitrate: Bitrate) -> Self {
+        Self { quantities, period, bitrate, take: Vec::new(), by_sdo: false, journal: None, on_kept: |_| () }
     }
 
     /// Checks what can be checked without the bus.

@@ -14,7 +14,7 @@ use words::time::some_time;
 
 use super::{Motion, Order, Run, ShapeName, run, usual_quantities};
 use crate::capture::commanded::measurands;
-use crate::capture::{Restorer, Wanted, not_put_back, with_left};
+use crate::capture::{Restorer, Wanted};
 
 /// How often steps are captured where nothing is said of it.
 const STEPS: Duration = Duration::from_millis(1);
@@ -99,17 +99,13 @@ impl TestMotionLine {
         let points =
             matches!(motion, Motion::Points { .. }).then(|| Duration::from_secs_f64(self.order.period_ms / 1e3));
         let names = if self.quantities.is_empty() { usual_quantities(drive).await? } else { self.quantities.clone() };
-        let wanted = Wanted {
-            period: self.rate.or(points).unwrap_or(STEPS),
-            ..Wanted::of_a_virtual_drive(measurands(drive, None, &names).await?, bitrate)
-        };
+        let quantities = measurands(drive, None, &names).await?;
+        let wanted = Wanted::of_a_virtual_drive(quantities, self.rate.or(points).unwrap_or(STEPS), bitrate);
         wanted.check(&motion.span())?;
         let restorer = Restorer::of(drive);
         let (mut runs, how) = (Vec::new(), (self.order.count, self.order.travel_turns));
         let moved = run((drive, &motion), (&wanted, &restorer), how, &mut runs, |_| ()).await;
-        let left = restorer.restore().await;
-        let back = not_put_back(drive.node().id(), &left).map_or(Ok(()), |failure| Err(with_left(failure, &left)));
-        both(moved, back).map(|()| runs)
+        both(moved, restorer.restored().await).map(|()| runs)
     }
 }
 

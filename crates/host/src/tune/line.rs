@@ -7,11 +7,11 @@ use machine::group_move::turns;
 use master::Drive;
 use master::cyclic::CyclicOptions;
 use master::units::{Amperes, Rpm};
-use words::failure::Failure;
+use words::failure::{Failure, both};
 use words::time::some_time;
 
 use super::{Order, Request, TuneReport, loops_of, tune};
-use crate::capture::{Restorer, with_left};
+use crate::capture::Restorer;
 
 /// A tuning as a line of a host asks for it.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,8 +83,7 @@ impl TuneLine {
         let request = self.request((loops.usual_rpm, loops.usual_a))?;
         let restorer = Restorer::of(drive);
         let tuned = tune((drive, &restorer), &request, &(), std::future::ready(false)).await;
-        let left = restorer.restore().await;
-        tuned.map_err(|failure| with_left(failure, &left))
+        both(tuned, restorer.restored().await)
     }
 }
 

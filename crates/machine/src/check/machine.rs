@@ -176,7 +176,7 @@ fn intended(machine: &Machine, places: &BTreeMap<u8, Places>, periods: &[Place])
     Intended {
         plan,
         nodes,
-        bitrate: machine.bitrate.unwrap_or(Bitrate::K500),
+        bitrate: machine.bus_bitrate(),
         cycle: Some(first.map_or(CYCLE, |first| first.cycle.period)),
         host_heartbeat: None,
         at: first.map_or(top, |first| first.at),

@@ -231,9 +231,14 @@ impl Machine {
         from_any_state(Some(placed.spec.description()), node, &placed.start_up)
     }
 
+    /// The bit rate of its bus: 500 kbit/s where it names none.
+    pub fn bus_bitrate(&self) -> Bitrate {
+        self.bitrate.unwrap_or(Bitrate::K500)
+    }
+
     /// Its bus, still without drives.
     pub fn world(&self) -> World {
-        World::new(self.bitrate.unwrap_or(Bitrate::K500), self.seed.unwrap_or(SEED))
+        World::new(self.bus_bitrate(), self.seed.unwrap_or(SEED))
     }
 
     /// Whether a drive of it takes its time: as itself says, or the machine, or else `otherwise`.

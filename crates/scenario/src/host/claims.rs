@@ -14,19 +14,16 @@ pub(in crate::host) enum Claim {
     InCycles,
     /// It makes a test motion, is measured for its gains, or its parameters are written or stored: nothing else is done with it.
     Whole,
-    /// A command by SDO: nothing is held.
-    Command,
 }
 
 impl Claim {
-    /// Whether one can begin beside one that is there. Who moves in cycles sets PDOs up, of which a capture that began before may
-    /// have taken some.
-    const fn goes_beside(self, there: Self) -> bool {
-        match (there, self) {
+    /// Whether a further one can begin beside it; `None` for a command by SDO, which holds nothing. What moves in cycles sets PDOs up, of
+    /// which a capture that began before may have taken some.
+    const fn allows(self, next: Option<Self>) -> bool {
+        match (self, next) {
             (Self::Whole, _) => false,
-            (Self::Captured | Self::InCycles, Self::Command) | (Self::InCycles, Self::Captured) => true,
-            (Self::Captured | Self::InCycles, _) => false,
-            (Self::Command, _) => true,
+            (_, None) | (Self::InCycles, Some(Self::Captured)) => true,
+            (_, Some(_)) => false,
         }
     }
 
@@ -35,7 +32,6 @@ impl Claim {
             Self::Captured => "is captured",
             Self::InCycles => "is moved in cycles",
             Self::Whole => "makes a test motion, or its parameters are written",
-            Self::Command => "has a command",
         }
     }
 }
@@ -57,18 +53,16 @@ impl Claimed {
     pub(super) fn of(
         all: &Rc<RefCell<Claims>>,
         host: usize,
-        (nodes, claim): (Vec<NodeId>, Claim),
+        (nodes, claim): (Vec<NodeId>, Option<Claim>),
     ) -> Result<Self, String> {
         let claims = &mut all.borrow_mut().0;
         let others = claims.iter().filter(|(node, ..)| nodes.contains(node));
-        if let Some((node, there, _)) = others.into_iter().find(|(_, there, _)| !claim.goes_beside(*there)) {
+        if let Some((node, there, _)) = others.into_iter().find(|(_, there, _)| !there.allows(claim)) {
             let text =
                 format!("node {node} {} meanwhile: wait for the end of that, or begin it behind this", there.words());
             return Err(text);
         }
-        if claim != Claim::Command {
-            claims.extend(nodes.iter().map(|node| (*node, claim, host)));
-        }
+        claims.extend(claim.into_iter().flat_map(|claim| nodes.iter().map(move |node| (*node, claim, host))));
         Ok(Self { all: Rc::clone(all), nodes, host })
     }
 }

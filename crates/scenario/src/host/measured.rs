@@ -1,26 +1,22 @@
 //! What a host measures of a drive: captures, test motions, gains.
 
-use can::Bitrate;
-use host::capture::{CaptureLine, refusal};
+use host::capture::CaptureLine;
 use host::test_motion::TestMotionLine;
 use host::tune::TuneLine;
 use master::units::Shown;
 use sim::Place;
 use words::counted;
 
+use super::whole::said;
 use super::{Done, HostTask};
 
 impl HostTask {
-    fn bitrate(&self) -> Bitrate {
-        self.machine.bitrate.unwrap_or(Bitrate::K500)
-    }
-
     /// Captures of a drive, as `ferrodrive capture` does: of each quantity its least and its greatest value.
     pub(super) async fn capture(&self, place: Place, asked: &CaptureLine) -> Done {
         let taken =
-            asked.carry_out(&self.drive(place)?, self.bitrate()).await.map_err(|failure| refusal(&failure).1)?;
+            asked.carry_out(&self.drive(place)?, self.machine.bus_bitrate()).await.map_err(|failure| said(&failure))?;
         if let Some(failure) = taken.cut_off {
-            return Err(refusal(&failure).1);
+            return Err(said(&failure));
         }
         let capture = taken.capture;
         let traces = capture.traces.iter().map(|trace| {
@@ -34,7 +30,8 @@ impl HostTask {
 
     /// Moves a drive by a test motion, as `ferrodrive test-motion` does: the figures of each run.
     pub(super) async fn test_motion(&self, place: Place, asked: &TestMotionLine) -> Done {
-        let runs = asked.carry_out(&self.drive(place)?, self.bitrate()).await.map_err(|failure| refusal(&failure).1)?;
+        let runs =
+            asked.carry_out(&self.drive(place)?, self.machine.bus_bitrate()).await.map_err(|failure| said(&failure))?;
         let runs = runs.iter().map(|run| {
             let rows = run.figures.rows().into_iter().map(|[what, value, _]| format!("{what} {value}"));
             let why = run.figures.no_steps.clone();
@@ -49,7 +46,7 @@ impl HostTask {
         if cfg!(target_arch = "wasm32") {
             return Err("a page without a server finds no gains: `ferrodrive run` does".to_owned());
         }
-        let report = asked.carry_out(&self.drive(place)?).await.map_err(|failure| refusal(&failure).1)?;
+        let report = asked.carry_out(&self.drive(place)?).await.map_err(|failure| said(&failure))?;
         let gains = report.gains.iter().map(|gain| format!("{} {} -> {}", gain.object, gain.before, gain.after));
         let found = format!("inertia {} kg m2", Shown(report.inertia_kg_m2));
         let tried = match (asked.apply, report.applied) {

@@ -148,7 +148,7 @@ fn with_reason(error: &dyn std::error::Error, reason: Option<master::Error>) -> 
 }
 
 /// A failure in one line, with its reasons.
-fn said(failure: &Failure) -> String {
+pub(super) fn said(failure: &Failure) -> String {
     let parts: Vec<_> = std::iter::once(&failure.what).chain(&failure.because).map(String::as_str).collect();
     parts.join(": ")
 }
