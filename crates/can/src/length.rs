@@ -18,28 +18,29 @@ const CRC_POLYNOMIAL: u16 = 0x4599;
 ///
 /// The interframe space ([`INTERFRAME_SPACE_BITS`]) comes on top.
 pub fn frame_bits(frame: &Frame) -> u32 {
-    let mut wire = Wire::default();
-    wire.field(0, 1); // start of frame
-    let raw = frame.id().raw();
-    let remote = u32::from(frame.is_remote());
-    if frame.id().is_extended() {
-        wire.field(raw >> 18, 11);
-        wire.field(0b11, 2); // SRR, IDE
-        wire.field(raw & 0x3_FFFF, 18);
-        wire.field(remote, 1);
-        wire.field(0, 2); // r1, r0
+    let raw = u64::from(frame.id().raw());
+    let control = u64::from(frame.is_remote()) << 6 | u64::from(frame.dlc());
+    // A recessive bit of the idle bus makes whole nibbles of the head: start of frame follows it.
+    let (head, head_bits) = if frame.id().is_extended() {
+        let (srr_and_ide, base, extension) = (0b11 << 25, raw >> 18, raw & 0x3_FFFF);
+        (1 << 39 | base << 27 | srr_and_ide | extension << 7 | control, 39)
     } else {
-        wire.field(raw, 11);
-        wire.field(remote, 1);
-        wire.field(0, 2); // IDE, r0
+        (1 << 19 | raw << 7 | control, 19)
+    };
+    let mut wire = Wire::IDLE;
+    for place in (0..=head_bits / 4).rev() {
+        wire.put((head >> (4 * place)) as u8 & 15);
     }
-    wire.field(u32::from(frame.dlc()), 4);
     for byte in frame.data() {
-        wire.field(u32::from(*byte), 8);
+        wire.put(byte >> 4);
+        wire.put(byte & 15);
     }
-    let crc = u32::from(wire.crc);
-    wire.field(crc, CRC_BITS);
-    wire.bits + TAIL_BITS
+    // The delimiter is not stuffed. What stands for it here differs from the bit before it, and so adds none.
+    let crc = wire.crc << 1 | (!wire.crc & 1);
+    for place in (0..4).rev() {
+        wire.stuff((crc >> (4 * place)) as u8 & 15);
+    }
+    head_bits + 8 * frame.data().len() as u32 + CRC_BITS + wire.stuff_bits + TAIL_BITS
 }
 
 /// The most bits that a data frame of `data_length` bytes can have, whatever its contents: a stuff bit after each four of those
@@ -61,40 +62,77 @@ pub const fn fewest_frame_bits(extended: bool, data_length: u8) -> u32 {
     head + data + CRC_BITS + TAIL_BITS
 }
 
-/// Counts bits as a transmitter puts them out.
-#[derive(Default)]
+/// Counts stuff bits as a transmitter puts bits out, four at a time.
 struct Wire {
-    bits: u32,
     crc: u16,
+    /// The last bit, and how many like it stand in a row, stuff bits among them.
     run: u8,
-    last: Option<bool>,
+    stuff_bits: u32,
 }
 
 impl Wire {
-    fn field(&mut self, value: u32, width: u32) {
-        for shift in (0..width).rev() {
-            self.bit(value >> shift & 1 != 0);
-        }
+    /// Before the recessive bit of an idle bus, which leaves a CRC of 0 and begins a row of its own.
+    const IDLE: Self = Self { crc: 1 << (CRC_BITS - 1), run: run(false, 1), stuff_bits: 0 };
+
+    fn put(&mut self, nibble: u8) {
+        let feedback = (self.crc >> (CRC_BITS - 4)) as u8 ^ nibble;
+        self.crc = self.crc << 4 & 0x7FFF ^ CRC_OF_NIBBLE[usize::from(feedback & 15)];
+        self.stuff(nibble);
     }
 
-    fn bit(&mut self, bit: bool) {
-        let feedback = bit != (self.crc >> (CRC_BITS - 1) & 1 != 0);
-        self.crc = (self.crc << 1) & 0x7FFF;
-        if feedback {
-            self.crc ^= CRC_POLYNOMIAL;
-        }
-        self.put(bit);
-        if self.run == STUFF_RUN {
-            self.put(!bit);
-        }
-    }
-
-    fn put(&mut self, bit: bool) {
-        self.bits += 1;
-        self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
-        self.last = Some(bit);
+    fn stuff(&mut self, nibble: u8) {
+        let (run, stuff_bits) = STUFFED[usize::from(self.run & 7)][usize::from(nibble & 15)];
+        self.run = run;
+        self.stuff_bits += u32::from(stuff_bits);
     }
 }
+
+/// One of eight: a fifth bit of a kind is followed by a stuff bit, with which the next row begins.
+const fn run(bit: bool, length: u8) -> u8 {
+    (bit as u8) << 2 | (length - 1)
+}
+
+/// What four bits add to the CRC.
+const CRC_OF_NIBBLE: [u16; 16] = {
+    let mut table = [0; 16];
+    let mut nibble = 0;
+    while nibble < 16 {
+        let mut crc = (nibble as u16) << (CRC_BITS - 4);
+        let mut bit = 0;
+        while bit < 4 {
+            let feedback = crc >> (CRC_BITS - 1) & 1;
+            crc = crc << 1 & 0x7FFF ^ feedback * CRC_POLYNOMIAL;
+            bit += 1;
+        }
+        table[nibble] = crc;
+        nibble += 1;
+    }
+    table
+};
+
+/// The row that is there behind four bits, and the stuff bits among them, by the row before them.
+const STUFFED: [[(u8, u8); 16]; 8] = {
+    let mut table = [[(0, 0); 16]; 8];
+    let mut place = 0;
+    while place < 128 {
+        let (before, nibble) = (place / 16, place % 16);
+        let (mut last, mut length, mut stuff_bits) = (before >> 2 == 1, (before & 3) as u8 + 1, 0);
+        let mut shift = 4;
+        while shift > 0 {
+            shift -= 1;
+            let bit = nibble >> shift & 1 == 1;
+            length = if bit == last { length + 1 } else { 1 };
+            last = bit;
+            if length == STUFF_RUN {
+                (last, length) = (!bit, 1);
+                stuff_bits += 1;
+            }
+        }
+        table[before][nibble] = (run(last, length), stuff_bits);
+        place += 1;
+    }
+    table
+};
 
 #[cfg(test)]
 mod tests {

@@ -46,6 +46,23 @@ impl Objective {
             Self::Bandwidth(_) => PHASE_MARGIN_DEG,
         }
     }
+
+    /// What gains are worth at most: those of one objective are compared by it.
+    fn most_worth(self, gains: &Loop, around: &Loop) -> f64 {
+        match self {
+            Self::PhaseMargin(_) => gains.integral,
+            // As near as can be; of the same, the stiffer one.
+            Self::Bandwidth(_) => 1e-3 * gains.integral / around.integral,
+        }
+    }
+
+    /// How far from a bandwidth they are, as the logarithm of the ratio.
+    fn off(self, margins: &Margins) -> f64 {
+        match self {
+            Self::PhaseMargin(_) => 0.0,
+            Self::Bandwidth(hz) => (margins.crossover_hz / hz).ln().abs(),
+        }
+    }
 }
 
 /// How far a loop is from being unstable.
@@ -88,63 +105,95 @@ pub fn margins(mechanics: &Mechanics, around: &Loop, highest_hz: f64) -> Margins
     margins_of(open_loop(mechanics, around), highest_hz)
 }
 
-/// A loop over its frequencies, closer where `1 + L` or `L` turns: at a resonance it does so within a hertz.
-fn sampled(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Vec<(f64, Complex<f64>)> {
+/// A loop over its frequencies, closer where `1 + L` or `L` turns: at a resonance it does so within a hertz. From each to the next as
+/// long as that is asked for; whether the end was reached.
+fn walk(
+    open: impl Fn(f64) -> Complex<f64>,
+    highest_hz: f64,
+    mut step: impl FnMut((f64, Complex<f64>), (f64, Complex<f64>)) -> bool,
+) -> bool {
     let at = |hz: f64| (hz, open(TAU * hz));
-    let mut all = vec![at(highest_hz * 10f64.powf(-DECADES))];
+    let mut last = at(lowest_hz(highest_hz));
     for n in 1..POINTS {
-        let mut ahead = vec![at(highest_hz * 10f64.powf(DECADES * (n as f64 / (POINTS - 1) as f64 - 1.0)))];
-        while let Some(next) = ahead.pop() {
-            let last = all[all.len() - 1];
+        let mut ahead = [at(highest_hz * 10f64.powf(DECADES * (n as f64 / (POINTS - 1) as f64 - 1.0))); HALVINGS + 1];
+        let mut left = 1;
+        while left > 0 {
+            let next = ahead[left - 1];
             // Far below a gain of one its phase says nothing.
             let is_small = last.1.norm().max(next.1.norm()) < SMALL;
             let turns = ((1.0 + next.1) / (1.0 + last.1)).arg().abs() > CLOSE_RAD
                 || !is_small && (next.1 / last.1).arg().abs() > CLOSE_RAD;
-            if turns && ahead.len() < HALVINGS {
-                ahead.extend([next, at((last.0 * next.0).sqrt())]);
+            if turns && left <= HALVINGS {
+                ahead[left] = at((last.0 * next.0).sqrt());
+                left += 1;
+            } else if step(last, next) {
+                (last, left) = (next, left - 1);
             } else {
-                all.push(next);
+                return false;
             }
         }
     }
-    all
+    true
+}
+
+fn lowest_hz(highest_hz: f64) -> f64 {
+    highest_hz * 10f64.powf(-DECADES)
+}
+
+/// How far between two frequencies a gain passes through one: its logarithm is nearly straight there.
+fn share_to_one(before: f64, now: f64) -> Option<f64> {
+    ((before - 1.0) * (now - 1.0) < 0.0).then(|| before.ln() / (before / now).ln())
+}
+
+fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
+    margins_while(open, highest_hz, |_| true)
 }
 
 /// Nyquist's criterion for an open loop with integrators and no unstable poles: with the frequency `1 + L` turns on from where the
-/// integrators hold it, a quarter turn back for each, to 1, and not once more around 0.
-fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
+/// integrators hold it, a quarter turn back for each, to 1, and not once more around 0. A loop whose margins are not to be had any
+/// more is left, as one that is not stable.
+fn margins_while(
+    open: impl Fn(f64) -> Complex<f64>,
+    highest_hz: f64,
+    are_wanted: impl Fn(&Margins) -> bool,
+) -> Margins {
     let mut margins =
         Margins { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 0.0, is_stable: false };
-    let all = sampled(open, highest_hz);
     // Integrators turn it back by up to half a turn and more: it comes from there.
     let back = |first: f64| if first > 0.0 { first - TAU } else { first };
-    let (mut turned, mut phase) = (back((1.0 + all[0].1).arg()), back(all[0].1.arg()));
-    for pair in all.windows(2) {
-        let [(last_hz, before), (hz, now)] = [pair[0], pair[1]];
+    let first = open(TAU * lowest_hz(highest_hz));
+    let (mut turned, mut phase, mut end) = (back((1.0 + first).arg()), back(first.arg()), first);
+    let has_ended = walk(open, highest_hz, |(last_hz, before), (hz, now)| {
         turned += ((1.0 + now) / (1.0 + before)).arg();
         margins.sensitivity = margins.sensitivity.max(1.0 / (1.0 + now).norm());
-        if (before.norm() - 1.0) * (now.norm() - 1.0) < 0.0 {
-            // Between the two the logarithm of the gain is nearly straight.
-            let share = before.norm().ln() / (before.norm() / now.norm()).ln();
+        let turn = (now / before).arg();
+        if let Some(share) = share_to_one(before.norm(), now.norm()) {
             margins.crossover_hz = last_hz * (hz / last_hz).powf(share);
-            let left = PI + phase + share * (now / before).arg();
+            let left = PI + phase + share * turn;
             // Ahead of the current, half a turn is as far away on the other side.
             margins.phase_deg = margins.phase_deg.min(left.min(TAU - left).to_degrees());
         }
-        phase += (now / before).arg();
+        phase += turn;
         // Through the negative real axis.
         if before.im * now.im < 0.0 && now.re < 0.0 && now.norm() < 1.0 {
             margins.gain = margins.gain.min(2.0 / (now.norm() + before.norm()));
         }
-    }
+        end = now;
+        are_wanted(&margins)
+    });
     // What is left to 1 beyond the last frequency is small: the loop gain is.
-    margins.is_stable = turned.abs() < PI / 2.0 && all[all.len() - 1].1.norm() < 1.0;
+    margins.is_stable = has_ended && turned.abs() < PI / 2.0 && end.norm() < 1.0;
     margins
 }
 
 impl Margins {
     fn keeps(&self, phase_deg: f64) -> bool {
-        self.is_stable && self.phase_deg >= phase_deg && self.gain >= GAIN_MARGIN && self.sensitivity <= SENSITIVITY
+        self.is_stable && self.can_keep(phase_deg)
+    }
+
+    /// So far: with each further frequency they grow less.
+    fn can_keep(&self, phase_deg: f64) -> bool {
+        self.phase_deg >= phase_deg && self.gain >= GAIN_MARGIN && self.sensitivity <= SENSITIVITY
     }
 }
 
@@ -162,43 +211,63 @@ pub fn propose(
     let phase_deg = objective.phase_deg();
     let mut best: Option<(f64, Proposal)> = None;
     for &filter_s in filters_s {
-        for step in -STEPS..=STEPS {
+        let with = |proportional: f64, integral: f64| Loop {
+            proportional: around.proportional * proportional,
+            integral,
+            filter_s,
+            ..*around
+        };
+        let crossovers = Crossovers::of(open_loop(mechanics, &with(SPAN, 0.0)), highest_hz);
+        // The greatest first: nothing below is better that has less integral gain.
+        for step in (-STEPS..=STEPS).rev() {
             let proportional = SPAN.powf(f64::from(step) / f64::from(STEPS));
-            let with = |integral: f64| Loop {
-                proportional: around.proportional * proportional,
-                integral,
-                filter_s,
-                ..*around
-            };
-            let crossover = margins(mechanics, &with(0.0), highest_hz).crossover_hz;
+            let Some(crossover) = crossovers.at(proportional / SPAN) else { continue };
             for time in INTEGRAL_TIMES {
-                let candidate = with(around.proportional * proportional * TAU * crossover / time);
+                let candidate = with(proportional, around.proportional * proportional * TAU * crossover / time);
                 let integral = candidate.integral / around.integral;
-                if crossover == 0.0 || !can_hold(proportional, integral) {
+                let most = best.as_ref().map_or(f64::NEG_INFINITY, |(worth, _)| *worth);
+                if most >= objective.most_worth(&candidate, around) || !can_hold(proportional, integral) {
                     continue;
                 }
-                let margins = margins(mechanics, &candidate, highest_hz);
+                let open = open_loop(mechanics, &candidate);
+                let margins = margins_while(open, highest_hz, |margins| margins.can_keep(phase_deg));
                 if !margins.keeps(phase_deg) || margins.crossover_hz > most_hz {
                     continue;
                 }
-                let worth = match objective {
-                    Objective::PhaseMargin(_) => candidate.integral,
-                    // As near as can be; of the same, the stiffer one.
-                    Objective::Bandwidth(hz) => {
-                        -(margins.crossover_hz / hz).ln().abs() + 1e-3 * candidate.integral / around.integral
-                    }
-                };
-                let is_limited = match objective {
-                    Objective::PhaseMargin(_) => false,
-                    Objective::Bandwidth(hz) => (margins.crossover_hz / hz).ln().abs() > 0.1,
-                };
-                if best.as_ref().is_none_or(|(most, _)| worth > *most) {
+                let off = objective.off(&margins);
+                let worth = objective.most_worth(&candidate, around) - off;
+                if worth > most {
+                    let is_limited = off > 0.1;
                     best = Some((worth, Proposal { proportional, integral, filter_s, margins, is_limited }));
                 }
             }
         }
     }
     best.map(|(_, proposal)| proposal)
+}
+
+/// Where the gain of a loop falls to one, whatever factor it is taken by.
+struct Crossovers(Vec<(f64, f64)>);
+
+impl Crossovers {
+    /// Of a loop by the greatest of the factors: there its frequencies are closest.
+    fn of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Self {
+        let lowest = lowest_hz(highest_hz);
+        let mut gains = vec![(lowest, open(TAU * lowest).norm())];
+        walk(open, highest_hz, |_, (hz, now)| {
+            gains.push((hz, now.norm()));
+            true
+        });
+        Self(gains)
+    }
+
+    /// The last of them, Hz.
+    fn at(&self, factor: f64) -> Option<f64> {
+        self.0.windows(2).rev().find_map(|pair| {
+            let [(last_hz, before), (hz, now)] = [pair[0], pair[1]];
+            Some(last_hz * (hz / last_hz).powf(share_to_one(before * factor, now * factor)?))
+        })
+    }
 }
 
 /// The gain of a position loop (1/s) around a speed loop, so that this phase is left; and its margins. `late_s` is how late the
@@ -216,9 +285,10 @@ pub fn propose_position(
         forward / (1.0 + speed(omega))
     };
     let with = |gain: f64| {
-        margins_of(
+        margins_while(
             |omega| gain / Complex::new(0.0, omega) * closed(omega) * Complex::from_polar(1.0, -omega * late_s),
             highest_hz,
+            |margins| margins.can_keep(phase_deg),
         )
     };
     let gains = (0..=200).rev().map(|n| 10f64.powf(f64::from(n) / 50.0 - 1.0));
