@@ -24,10 +24,10 @@ const GAIN_MARGIN: f64 = 2.0;
 /// Phase margin where the objective is a bandwidth.
 const PHASE_MARGIN_DEG: f64 = 40.0;
 /// Gains that are tried: so many of each, this far below and above those of the drive.
-const STEPS: i32 = 40;
+const STEPS: i32 = 60;
 const SPAN: f64 = 30.0;
 /// Integral times that are tried, in times of the crossover.
-const INTEGRAL_TIMES: [f64; 7] = [2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0];
+const INTEGRAL_TIMES: [f64; 11] = [2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 10.0, 20.0];
 
 /// What the gains are to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]

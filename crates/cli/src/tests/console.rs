@@ -9,7 +9,7 @@ use web::HostedWorld;
 
 use super::virtual_bus::without_bus;
 
-const MACHINE: &str = "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n\n[[drive]]\nmodel = 'm4230e17b50'\nnode = 1\n";
+const MACHINE: &str = "timing = 'ideal'\n\n[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n\n[[drive]]\nmodel = 'm4230e17b50'\nnode = 1\n";
 
 /// A page that has control, with its own world of the machine.
 struct Page {

@@ -7,6 +7,7 @@ use can::Bitrate;
 use clap::FromArgMatches;
 use processes::Ended;
 use serde_json::Value;
+use sim::machine::TimingMode;
 use sim::{Place, Report, World};
 
 use crate::args::Cli;
@@ -41,10 +42,13 @@ impl VirtualBus {
         Self::of_machine(&machine)
     }
 
-    /// The drives of a machine file, which have booted.
+    /// The drives of a machine file, which have booted; they take no time for what they do, unless the file says so.
     #[track_caller]
     pub(super) fn of_machine(machine: &Machine) -> Self {
-        let bus = Self { world: Arc::new(Mutex::new(machine.build().expect("a machine"))), options: Vec::new() };
+        let mut machine = machine.clone();
+        machine.timing = machine.timing.or(Some(TimingMode::Ideal));
+        let world = machine.build().expect("a machine");
+        let bus = Self { world: Arc::new(Mutex::new(world)), options: Vec::new() };
         bus.pass(BOOT);
         bus
     }

@@ -167,7 +167,7 @@ fn the_energies_of_a_driven_shaft_fit_together() {
     for (model, node, load, turn, ratio) in drives {
         let scenario = place.join(format!("{model}.toml"));
         let text = format!(
-            "title = \"A load that is driven\"\nend = \"3s\"\n[machine]\ndrive = [{{ model = \"{model}\", node = {node} }}]\n\
+            "title = \"A load that is driven\"\nend = \"3s\"\n[machine]\ntiming = \"ideal\"\ndrive = [{{ model = \"{model}\", node = {node} }}]\n\
              [[host]]\ndo = [\"{turn}\", \"wait 1s\"]\n[[step]]\nat = \"1200ms\"\ndo = \"{node} load torque {load}\"\n"
         );
         std::fs::write(&scenario, text).unwrap();

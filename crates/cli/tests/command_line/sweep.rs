@@ -13,6 +13,7 @@ const RANDOM: &str = "
 title = 'Frames are lost'
 end = '400ms'
 [machine]
+timing = 'ideal'
 drive = [{ model = 'zlac8030l', node = 4 }]
 [parameters]
 volts = 24

@@ -31,7 +31,7 @@ fn order() -> Order {
         current_a: 15.0,
         travel_turns: 40.0,
         // A bus of 500 kbit/s has no room for more.
-        period_ms: 2.0,
+        period_ms: Some(2.0),
         torque_constant_nm_a: None,
     }
 }
@@ -214,8 +214,8 @@ fn a_tuning_beyond_a_limit_or_beside_other_motion_moves_nothing() {
             (with(|order| order.bandwidth_hz = Some(f64::NAN)), "expected a bandwidth from 0.1 to 500 Hz"),
             (with(|order| order.travel_turns = 0.0), "expected a travel from 0.1"),
             (with(|order| order.current_a = 0.0), "expected a current from 0.01"),
-            (with(|order| order.period_ms = -1.0), "expected a period of 0 ms or more"),
-            (with(|order| order.period_ms = 100.0), "expected a period from"),
+            (with(|order| order.period_ms = Some(-1.0)), "expected a period of 0 ms or more"),
+            (with(|order| order.period_ms = Some(100.0)), "expected a period from"),
         ] {
             let (kind, text) = page.refused(wanted).await;
             assert!(kind == "usage" && text.contains(says), "{kind}: {text}");

@@ -13,7 +13,9 @@ use words::failure::{Failure, both};
 use super::bench::{CURRENT_KIND, ENOUGH_CURRENT, SWINGS, bytes};
 use super::moves::{MoveRow, TrialMove, WRITTEN};
 use super::setup::keep;
-use super::{Bench, Excursion, Proposed, Reader, Request, Setup, StepResponse, TuneReport, find, loops_of};
+use super::{
+    Bench, Excursion, Proposed, Reader, Request, SAMPLE_PERIODS, Setup, StepResponse, TuneReport, find, loops_of,
+};
 use crate::capture::{Restorer, with_left};
 use crate::network::Progress;
 use crate::network::params::Transaction;
@@ -84,6 +86,8 @@ pub async fn try_gains(
     let former = request.journal.as_deref().map(former_gains);
     check_no_former(request, id)?;
     check_unchanged(drive, &proposed).await?;
+    let sampled = report.period_ms.map(|period_ms| Duration::from_secs_f64(period_ms / 1e3));
+    let request = &Request { period: sampled.or(request.period), ..request.clone() };
     let moves = request.with_position && can_move(drive, request);
     if moves != request.with_position {
         let why = "a move is not tried on this drive: it shows no speed or no current, or has no profile position";
@@ -143,7 +147,7 @@ async fn judged(
         true => failure.next("ask for gains that take less, e.g. --phase-margin 50"),
         false => failure,
     })?;
-    report.drive_error = Some([before.step.error(), after.step.error()]);
+    report.drive_error = Some([before.step.smooth_error(), after.step.smooth_error()]);
     if let Some((_, Some(seen))) = &after.moved {
         let what = "with the new gains the shaft was not seen to stand while they held it, and stands without power";
         report.notes.push(format!("{what}: {seen}"));
@@ -211,19 +215,20 @@ fn objection(before: &Answers, after: &Answers, request: &Request, report: &Tune
     let slow_a = MORE_THAN_TWIN * before.slow_ripple_a.max(usual_a);
     // A drive that is to be slower than it was may be off by more.
     let is_slower = report.after.crossover_hz < report.before.crossover_hz;
-    let most_error = match request.objective {
-        Objective::PhaseMargin(_) if !is_slower => before.step.error(),
+    let most_error = |error: fn(&StepResponse) -> f64| match request.objective {
+        Objective::PhaseMargin(_) if !is_slower => error(&before.step),
         _ => {
-            let size = |answer: &StepResponse| answer.step_rpm.1 - answer.step_rpm.0;
-            let of_twin = report.curves.twin[1].step.error() * size(&after.step) / size(&report.curves.twin[1].step);
-            before.step.error().max(MORE_THAN_TWIN * of_twin)
+            let (twin, size) = (&report.curves.twin[1].step, |of: &StepResponse| of.step_rpm.1 - of.step_rpm.0);
+            error(&before.step).max(MORE_THAN_TWIN * error(twin) * size(&after.step) / size(twin))
         }
     };
-    let error = after.step.error();
+    // When a drive read its positions decides nothing; a speed that swings fast is one whose current does.
+    let is_worse = |error: fn(&StepResponse) -> f64| error(&after.step) > most_error(error);
     let is_off = || {
+        let (error, most_error) = (after.step.smooth_error(), most_error(StepResponse::smooth_error));
         let text =
             || format!("its error after a step is {error:.2} r/min s with the new gains, more than {most_error:.2}");
-        (error > most_error).then(text)
+        (is_worse(StepResponse::error) && is_worse(StepResponse::smooth_error)).then(text)
     };
     swings(after.step.ripple_a(), before.step.ripple_a().max(usual_a).max(of_twin_a), "after a step")
         .or_else(|| swings(after.slow_ripple_a, slow_a, "at a slow speed"))
@@ -254,7 +259,8 @@ pub async fn step(
             *excursion = reader.excursion;
             return both(answer.map(|answer| (answer, 0.0)), reader.stop().await);
         }
-        let mut bench = Bench::open(drive, loops, request.period, request.bounds, request.cyclic, *excursion).await?;
+        let period = request.period.unwrap_or(SAMPLE_PERIODS[0]);
+        let mut bench = Bench::open(drive, loops, period, request.bounds, request.cyclic, *excursion).await?;
         let answer = match bench.step_response(most_rpm, ANSWER_S).await {
             Ok(step) => bench.slow_ripple_a().await.map(|slow_ripple_a| (step, slow_ripple_a)),
             Err(failure) => Err(failure),

@@ -110,7 +110,19 @@ pub struct StepResponse {
 impl StepResponse {
     /// Integral of the absolute error from the step on, in r/min s: the less, the better.
     pub fn error(&self) -> f64 {
-        self.speed_rpm.iter().map(|speed| (self.step_rpm.1 - speed).abs()).sum::<f64>() * self.period_s
+        self.error_beyond(0.0)
+    }
+
+    /// The same without what the times at which a drive reads its position make of a steady speed, and whatever else swings fast in the
+    /// second half.
+    pub fn smooth_error(&self) -> f64 {
+        let settled = &self.speed_rpm[self.speed_rpm.len() / 2..];
+        self.error_beyond(mean(about_slow_mean(settled, self.period_s).map(f64::abs)))
+    }
+
+    fn error_beyond(&self, noise_rpm: f64) -> f64 {
+        let error_rpm = mean(self.speed_rpm.iter().map(|speed| (self.step_rpm.1 - speed).abs()));
+        (error_rpm - noise_rpm).max(0.0) * self.speed_rpm.len() as f64 * self.period_s
     }
 
     /// Root mean square of what the current does in the last half: that of a loop that is not stable does not end.
@@ -119,16 +131,26 @@ impl StepResponse {
     }
 }
 
-/// Root mean square about a mean that follows slowly: what is still on its way to its end does not swing.
+/// Root mean square of what swings.
 fn ripple(values: &[f64], period_s: f64) -> f64 {
+    mean(about_slow_mean(values, period_s).map(|off| off * off)).sqrt()
+}
+
+/// Values less a mean that follows slowly: what is still on its way to its end does not swing.
+fn about_slow_mean(values: &[f64], period_s: f64) -> impl Iterator<Item = f64> {
     let span = ((SLOW_S / period_s) as usize).clamp(1, values.len().max(1));
-    let off = values.windows(span).map(|window| window[span / 2] - window.iter().sum::<f64>() / span as f64);
-    let (sum, count) = off.fold((0.0, 0.0_f64), |(sum, count), off| (sum + off * off, count + 1.0));
-    (sum / count.max(1.0)).sqrt()
+    values.windows(span).map(move |window| window[span / 2] - window.iter().sum::<f64>() / span as f64)
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count.max(1.0)
 }
 
 /// What a failure is called where the current was at its bound.
 pub(super) const CURRENT_KIND: &str = "current_bound";
+/// And where a sample did not come in its cycle.
+pub(super) const LATE_KIND: &str = "no_rate";
 /// Cycles until all TPDOs have come again.
 const SKIPPED: usize = 2;
 /// From one speed to the next, and until it is steady.
@@ -241,26 +263,41 @@ impl Bench {
             is_guarded,
         };
         it.network.sync(Some(period));
-        let late = || failed(&"it was not enabled within 2 s").next(format!("ferrodrive explain {}", node.node().id()));
-        match it.enable().await.and_then(|follows| if follows { Ok(()) } else { Err(late()) }) {
+        match it.enable().await {
             Ok(()) => Ok(it),
             // It may have power by now.
             Err(failure) => both(Err(failure), it.stop().await),
         }
     }
 
-    /// Whether the drive follows within [`ENABLING_S`].
-    async fn enable(&mut self) -> Result<bool, Failure> {
+    /// The sample of a cycle that came, and is the next one.
+    fn in_time(&self, shown: Option<(i64, i64)>, before: &mut Option<u64>) -> Result<(i64, i64), Failure> {
+        let cycle = self.network.cycle().map(|cycle| cycle.number);
+        let is_late = before.zip(cycle).is_some_and(|(before, now)| now != before + 1);
+        *before = cycle;
+        shown.filter(|_| !is_late).ok_or_else(|| {
+            let reason = "a sample is missing: this program was late, or the bus has no room for the drive's TPDOs";
+            self.stopped(reason).of_kind(LATE_KIND).next("give --realtime (Linux), or a longer --period")
+        })
+    }
+
+    /// The drive follows within [`ENABLING_S`].
+    async fn enable(&mut self) -> Result<(), Failure> {
         // What came in the last cycle of a motion that was dropped counts as new until it comes again: its statusword shows power.
         for _ in 0..SKIPPED {
             self.network.next_sync().await.map_err(|error| self.stopped(error))?;
         }
+        let (mut before, mut seen) = (None, Ok((0, 0)));
         for _ in 0..self.cycles(ENABLING_S) {
-            if self.step(Demand::Hold).await?.0.follows {
-                return Ok(true);
+            let (state, shown) = self.step(Demand::Hold).await?;
+            if state.follows {
+                return Ok(());
             }
+            seen = seen.and(self.in_time(shown, &mut before));
         }
-        Ok(false)
+        let id = self.drive.node();
+        let late = || self.stopped("it was not enabled within 2 s").next(format!("ferrodrive explain {id}"));
+        Err(seen.err().unwrap_or_else(late))
     }
 
     fn cycles(&self, time_s: f64) -> usize {
@@ -306,13 +343,7 @@ impl Bench {
             if let Some(refusal) = state.refused {
                 return Err(self.stopped(refusal));
             }
-            let cycle = self.network.cycle().map(|cycle| cycle.number);
-            let late = before.zip(cycle).is_some_and(|(before, now)| now != before + 1);
-            let Some((position, current)) = shown.filter(|_| !late) else {
-                let reason = "a sample is missing: this program was late, or the bus has no room for the drive's TPDOs";
-                return Err(self.stopped(reason).next("give --realtime (Linux), or a longer --period"));
-            };
-            *before = cycle;
+            let (position, current) = self.in_time(shown, before)?;
             let (turns, current_a) = (position as f64 / self.counts_per_turn, current as f64 * self.current_per_count);
             self.keep_bounds(turns, current_a)?;
             samples.push(asked * RAD_S_PER_RPM, current_a, turns * std::f64::consts::TAU);
@@ -462,11 +493,17 @@ impl Bench {
             Err(failure) if bring_to_rest(&self.node).await.is_err() => Err(failure),
             _ => Ok(()),
         };
-        if !self.is_guarded {
-            return stood;
-        }
         // One that may still be moving gets no further sign of life, and is left to its own watch.
-        stood.and(self.network.release_guards([node].into_iter().collect()).await.map_err(Failure::from))
+        stood.and(self.release().await)
+    }
+
+    /// Ends its cycles, and the guard that began with it.
+    async fn release(&self) -> Result<(), Failure> {
+        self.network.sync(None);
+        if !self.is_guarded {
+            return Ok(());
+        }
+        self.network.release_guards([self.drive.node()].into_iter().collect()).await.map_err(Failure::from)
     }
 
     /// Whether it was seen to stand without power.

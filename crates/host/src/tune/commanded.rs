@@ -11,7 +11,9 @@ use words::failure::Failure;
 
 use super::bench::bytes;
 use super::outcome::{TuneOutcome, Tuned};
-use super::{Excursion, LoadOrder, Order, Request, find, loops_of, open_loop_of, try_gains, tune_ramps};
+use super::{
+    Excursion, LoadOrder, Order, Request, SAMPLE_PERIODS, find, loops_of, open_loop_of, try_gains, tune_ramps,
+};
 use crate::capture::commanded::refusal;
 use crate::capture::{Restorer, WayBack, not_put_back, with_left};
 use crate::command::TuneCommand;
@@ -95,7 +97,11 @@ impl Host {
         let (_, loops) = loops_of(&drive).map_err(|failure| refusal(&failure))?;
         // A virtual bus ends with the program, and nothing is left to go back to.
         let journal = self.setting.journals.is_some().then(|| default_path(node));
-        let request = order.request(loops.usual_rpm, cyclic(order.period_ms), journal);
+        let request = order.request(
+            loops.usual_rpm,
+            cyclic(order.period_ms.unwrap_or(SAMPLE_PERIODS[0].as_secs_f64() * 1e3)),
+            journal,
+        );
         request.map(|request| (drive, request)).map_err(|failure| refusal(&failure))
     }
 

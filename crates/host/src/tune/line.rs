@@ -48,7 +48,7 @@ impl FromStr for TuneLine {
                     asked.current_a = Some(value()?.parse::<Amperes>().map_err(|error| error.to_string())?.0);
                 }
                 "travel" => order.travel_turns = turns(value()?)?,
-                "period" => order.period_ms = some_time(value()?)?.as_secs_f64() * 1e3,
+                "period" => order.period_ms = Some(some_time(value()?)?.as_secs_f64() * 1e3),
                 "torque-constant" => order.torque_constant_nm_a = Some(finite(value()?)?),
                 "apply" => asked.apply = true,
                 _ => return Ok(false),

@@ -7,11 +7,34 @@ use master::Drive;
 use master::cyclic::CyclicOptions;
 use words::failure::{Failure, both};
 
-use super::bench::{Bench, Bounds, CURRENT_KIND, Excursion, Measurement, excitation};
+use super::bench::{Bench, Bounds, CURRENT_KIND, Excursion, LATE_KIND, Measurement, excitation};
+use super::report::{Request, SAMPLE_PERIODS};
 use super::setup::Setup;
 
 /// How often gains are halved before a speed loop that swings is given up.
 const HALVINGS: u32 = 4;
+
+/// Measures a drive in the period that was asked for, or in the shortest of [`SAMPLE_PERIODS`] in which no sample is missing.
+///
+/// # Errors
+/// As [`measure`].
+pub(super) async fn measure_in_time(
+    drive: &Drive,
+    setup: &Setup,
+    loops: &Loops,
+    request: &Request,
+    excursion: &mut Excursion,
+) -> Result<(Duration, Measurement), Failure> {
+    let periods = request.period.as_ref().map_or(&SAMPLE_PERIODS[..], std::slice::from_ref);
+    let mut late = None;
+    for &period in periods {
+        match measure(drive, setup, loops, (period, request.bounds, request.cyclic), excursion).await {
+            Err(failure) if failure.kind == LATE_KIND => late = Some(failure),
+            measured => return measured.map(|measured| (period, measured)),
+        }
+    }
+    Err(late.unwrap_or_else(|| Failure::new("no period is given")))
+}
 
 /// Measures a drive; [`Setup::put_back`] undoes what was written for that. Gains with which the speed loop swings by itself are
 /// halved meanwhile.

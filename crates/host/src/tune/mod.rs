@@ -42,7 +42,7 @@ pub use proposed::{Gain, Proposed, Unreachable};
 pub use ramps::{RampReport, RampRequest, open_loop_of, tune_ramps};
 pub use ramps_twin::TwinRow;
 pub use readings::{Currents, OutputLoad, Reader, Shaft};
-pub use report::{GainRow, MarginRow, Request, TuneReport, find};
+pub use report::{GainRow, MarginRow, Request, SAMPLE_PERIODS, TuneReport, find};
 pub use setup::{Setup, speed_gains};
 pub use twin::{Trial, Twin, constant_of, motor_of};
 

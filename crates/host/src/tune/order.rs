@@ -30,8 +30,9 @@ pub struct Order {
     pub current_a: f64,
     /// Farthest that the motor's shaft may turn from where it stands.
     pub travel_turns: f64,
-    /// Time from one sample to the next.
-    pub period_ms: f64,
+    /// Time from one sample to the next; the shortest that drive and bus keep up with without it.
+    #[serde(default)]
+    pub period_ms: Option<f64>,
     /// Torque per ampere, where the motor is not the model's own.
     pub torque_constant_nm_a: Option<f64>,
 }
@@ -47,7 +48,7 @@ impl Order {
             speed_rpm: None,
             current_a,
             travel_turns,
-            period_ms: 1.0,
+            period_ms: None,
             torque_constant_nm_a: None,
         }
     }
@@ -60,7 +61,7 @@ impl Order {
         let request = Request {
             objective: self.bandwidth_hz.map_or(Objective::PhaseMargin(self.phase_margin_deg), Objective::Bandwidth),
             with_position: self.position,
-            period: time("a period", self.period_ms)?,
+            period: self.period_ms.map(|period_ms| time("a period", period_ms)).transpose()?,
             bounds: Bounds {
                 speed_rpm: self.speed_rpm.map_or(usual_rpm, f64::abs),
                 current_a: self.current_a.abs(),

@@ -16,9 +16,10 @@ use words::failure::{Failure, both};
 use crate::capture::Restorer;
 
 use super::bench::SWINGS;
+use super::measure::measure_in_time;
 use super::{
     Bounds, Currents, Curves, Excursion, Found, Measurement, MoveRow, OutputLoad, Proposed, Reader, ResponseRow, Setup,
-    Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, measure, motor_of, speed_gains,
+    Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, motor_of, speed_gains,
 };
 
 /// How often the load of a twin is corrected, and the relative difference at which it is right.
@@ -27,7 +28,11 @@ const ALIKE: f64 = 3e-3;
 
 /// Shortest and longest time between two samples: 1 ms and 4096 counts a turn show what there is to see, and a tenth of the rate is to
 /// be beyond a loop's bandwidth.
-const PERIODS: RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
+const RANGE: RangeInclusive<Duration> = Duration::from_micros(500)..=Duration::from_millis(10);
+/// Those that are tried, where none is given: a bus of 500 kbit/s has no room for a cycle of 1 ms, and few computers are in time for one
+/// over a socket.
+pub const SAMPLE_PERIODS: [Duration; 4] =
+    [Duration::from_millis(1), Duration::from_millis(2), Duration::from_millis(5), Duration::from_millis(10)];
 
 /// How often gains are made slower, and by how much.
 const SLOWER: usize = 12;
@@ -50,8 +55,8 @@ pub struct Request {
     pub objective: Objective,
     /// The gain of the position loop too.
     pub with_position: bool,
-    /// Time from one sample to the next.
-    pub period: Duration,
+    /// Time from one sample to the next; `None`: the first of [`SAMPLE_PERIODS`] that drive, bus and program keep up with.
+    pub period: Option<Duration>,
     /// What the motion keeps to.
     pub bounds: Bounds,
     /// How late the program may be, and what guards the drive.
@@ -74,9 +79,8 @@ impl Request {
     /// # Errors
     /// What is out of range, and what is not.
     pub fn check(&self) -> Result<(), Failure> {
-        if !PERIODS.contains(&self.period) {
-            let what =
-                format!("expected a period from {:?} to {:?}, got {:?}", PERIODS.start(), PERIODS.end(), self.period);
+        if let Some(period) = self.period.filter(|period| !RANGE.contains(period)) {
+            let what = format!("expected a period from {:?} to {:?}, got {period:?}", RANGE.start(), RANGE.end());
             return Err(Failure::usage(what).next("1 ms suits a bus of 1 Mbit/s, e.g. --period 1ms"));
         }
         let Bounds { speed_rpm, current_a, travel_turns } = self.bounds;
@@ -133,6 +137,8 @@ pub struct TuneReport {
     pub model_off: f64,
     /// How far the measured response of the twin is from that of the drive, likewise.
     pub twin_off: f64,
+    /// Time from one sample to the next; `None` of a joint, whose readings take as long as they take.
+    pub period_ms: Option<f64>,
     /// The share of the drive's gains with which it was measured: below 1 where its speed loop swings by itself.
     pub gain_share: f64,
     /// The most current that was asked for.
@@ -218,11 +224,10 @@ pub async fn find(
         Failure::new(format!("node {id}: nothing could be found")).at_node(id).because(reason)
     };
     let motor = motor_of(model).ok_or_else(|| failed(&"no motor with magnets is known for its model"))?;
-    let how = (request.period, request.bounds);
     let (journal, on_kept) = (request.journal.as_deref(), request.on_kept);
     let had = Setup::begin((drive, restorer), (model, loops), &speed_gains(loops), journal, on_kept).await?;
     restorer.begin_motion(loops.demand.is_some());
-    let (found, twin, twin_off, response) = match (loops.demand, loops.stated, motor.gear) {
+    let (period, found, twin, twin_off, response) = match (loops.demand, loops.stated, motor.gear) {
         (None, Some(stated), Some(gear)) => {
             let currents = both(currents(drive, &had, request, excursion).await, had.put_back(drive).await)?;
             let mut motor = motor;
@@ -230,21 +235,22 @@ pub async fn find(
                 motor.windings.flux_linkage_wb *= constant / motor.windings.torque_constant_nm_a();
             }
             let shaft = Shaft { motor: &motor, gear: &gear, stated: &stated };
-            let (found, twin, off) = by_readings((model, loops), &shaft, &had, (&currents, how.1)).await?;
-            (found, twin, off, Vec::new())
+            let (found, twin, off) = by_readings((model, loops), &shaft, &had, (&currents, request.bounds)).await?;
+            (None, found, twin, off, Vec::new())
         }
         _ => {
-            let measured = measure(drive, &had, loops, (how.0, how.1, request.cyclic), excursion).await;
-            let measured = both(measured, had.put_back(drive).await)?;
+            let measured = measure_in_time(drive, &had, loops, request, excursion).await;
+            let (period, measured) = both(measured, had.put_back(drive).await)?;
             let own = constant_of((model, loops), &motor, had.rated_constant());
             let constant = request.torque_constant_nm_a.or(loops.torque_constant_nm_a).unwrap_or(own);
             let found = Found::of(&measured, &had, loops, (&motor, constant)).map_err(|error| failed(&error))?;
             let twin = Twin::new((model, loops), &found, (&motor, own), gains_of(&had, loops));
-            let of_twin = twin.measure(&had.lowered(measured.gain_share), how).await?;
+            let of_twin = twin.measure(&had.lowered(measured.gain_share), (period, request.bounds)).await?;
             let (off, response) = between(&measured, &of_twin, &found.plant).map_err(|error| failed(&error))?;
-            (found, twin, off, response)
+            (Some(period), found, twin, off, response)
         }
     };
+    let how = (period.or(request.period).unwrap_or(SAMPLE_PERIODS[0]), request.bounds);
     // On the twin a large current does no harm.
     let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
     let of = |most_hz| Proposed::of(&found, &had, (model, loops), (request.objective, most_hz), request.with_position);
@@ -262,7 +268,8 @@ pub async fn find(
         twin_off,
         peak_a: excursion.peak_a,
         travel_turns: excursion.travel_turns,
-        notes: notes(&found, &proposed, request).into_iter().chain(calmer).collect(),
+        period_ms: period.map(|period| period.as_secs_f64() * 1e3),
+        notes: notes(&found, &proposed, request, period).into_iter().chain(calmer).collect(),
         ..rows(id.raw(), model, &found, &proposed, &trials)
     };
     report.response = response;
@@ -379,6 +386,7 @@ fn rows(node: u8, model: &Description, found: &Found, proposed: &Proposed, trial
         frequencies: found.response.as_ref().map_or(0, |response| response.lines.len()),
         model_off: found.mechanics.off,
         twin_off: 0.0,
+        period_ms: None,
         gain_share: found.gain_share,
         peak_a: 0.0,
         travel_turns: 0.0,
@@ -427,8 +435,11 @@ fn between(drive: &Measurement, twin: &Measurement, model: &Mechanics) -> Result
     Ok((tune::distance(&drive, nearest), drive.lines.iter().map(row).collect()))
 }
 
-fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
+fn notes(found: &Found, proposed: &Proposed, request: &Request, period: Option<Duration>) -> Vec<String> {
     let mut notes = Vec::new();
+    if let (None, Some(period)) = (request.period, period.filter(|period| *period > SAMPLE_PERIODS[0])) {
+        notes.push(format!("it was sampled every {period:?}: in a shorter period samples were missing"));
+    }
     if found.response.is_none() {
         notes.push(
             "its loops cannot be measured from outside: what a count of its gains is worth is assumed, and so is its reducer".into(),
@@ -446,7 +457,8 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request) -> Vec<String> {
     }
     let wants_more = proposed.is_limited || matches!(request.objective, Objective::PhaseMargin(_));
     if wants_more && reached > AT_ITS_END * seen {
-        let shorter = if request.period > *PERIODS.start() { "; a shorter --period shows more" } else { "" };
+        let shorter =
+            if period.is_some_and(|period| period > *RANGE.start()) { "; a shorter --period shows more" } else { "" };
         notes.push(format!("faster gains are not proposed: the shaft was seen to follow up to {seen:.0} Hz{shorter}"));
     }
     if request.torque_constant_nm_a.is_none() {

@@ -15,4 +15,5 @@ mod tune_joint;
 mod tune_named;
 mod tune_ramps;
 mod tune_random;
+mod tune_rate;
 mod tune_trial;

@@ -195,7 +195,7 @@ impl Moved {
         let request = Request {
             objective: Objective::PhaseMargin(40.0),
             with_position: false,
-            period: Duration::from_millis(1),
+            period: Some(Duration::from_millis(1)),
             bounds: Bounds { speed_rpm: loops_of(drive)?.1.usual_rpm, ..Bounds::default() },
             cyclic: CyclicOptions::default(),
             torque_constant_nm_a: None,

@@ -181,7 +181,7 @@ pub(crate) fn request() -> Request {
     Request {
         objective: Objective::PhaseMargin(40.0),
         with_position: false,
-        period: PERIOD,
+        period: Some(PERIOD),
         bounds: Bounds::default(),
         cyclic: CyclicOptions::default(),
         torque_constant_nm_a: None,
@@ -427,7 +427,7 @@ fn what_no_motion_can_be_measured_with_is_refused_before_anything_moves() {
         change(&mut request);
         request.check().unwrap_err()
     };
-    let period = with(|request| request.period = Duration::from_micros(100));
+    let period = with(|request| request.period = Some(Duration::from_micros(100)));
     assert!(period.is_usage && period.what.contains("500\u{b5}s to 10ms"), "{period:?}");
     let refused = |what: &str, values: &[f64], set: fn(&mut Request, f64)| {
         for value in values {

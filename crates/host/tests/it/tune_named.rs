@@ -53,7 +53,7 @@ fn machine(loops: &str, load: [f64; 3]) -> Machine {
 fn machine_with(loops: &str, load: [f64; 3], more: &str) -> Machine {
     let [inertia, dry, viscous] = load;
     let text = format!(
-        "[[drive]]\nmodel = 'maker.eds'\nnode = 5\nload = {{ inertia_kg_m2 = {inertia}, friction = {{ coulomb_nm = {dry}, viscous_nm_s = {viscous} }}{more} }}\n\
+        "bitrate = '1M'\ntiming = 'ideal'\n[[drive]]\nmodel = 'maker.eds'\nnode = 5\nload = {{ inertia_kg_m2 = {inertia}, friction = {{ coulomb_nm = {dry}, viscous_nm_s = {viscous} }}{more} }}\n\
          [drive.loops]\n{loops}"
     );
     Machine::parse_in(&text, folder().path()).unwrap_or_else(|bad| panic!("{bad}"))

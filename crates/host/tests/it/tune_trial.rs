@@ -30,7 +30,8 @@ fn gains_found_with_few_samples_are_the_same_at_each_speed_and_are_kept() {
         let (mut world, drive) = wheel(&["load inertia 0.05", "load friction 0.2 viscous 0.01"]).world().unwrap();
         let bounds = Bounds { speed_rpm, current_a: 15.0, ..Bounds::default() };
         let period = Duration::from_millis(5);
-        let (request, restorer) = (Request { apply: true, period, bounds, ..request() }, Restorer::of(&drive));
+        let (request, restorer) =
+            (Request { apply: true, period: Some(period), bounds, ..request() }, Restorer::of(&drive));
         let run = tune((&drive, &restorer), &request, &(), std::future::ready(false));
         let report = sim::block_on(&mut world, run).unwrap().unwrap();
         assert!(

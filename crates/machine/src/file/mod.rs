@@ -241,9 +241,9 @@ impl Machine {
         World::new(self.bus_bitrate(), self.seed.unwrap_or(SEED))
     }
 
-    /// Whether a drive of it takes its time: as itself says, or the machine, or else `otherwise`.
-    pub fn timing_of(&self, placed: &Placed, otherwise: TimingMode) -> TimingMode {
-        placed.spec.timing.or(self.timing).unwrap_or(otherwise)
+    /// Whether a drive of it takes its time: as itself says, or the machine. As real ones do, where neither says anything.
+    pub fn timing_of(&self, placed: &Placed) -> TimingMode {
+        placed.spec.timing.or(self.timing).unwrap_or(TimingMode::Device)
     }
 
     /// Makes the drives of its world, which are there already, as real as it says.
@@ -287,7 +287,7 @@ impl Machine {
                 sim::machine::order(spec.model, &order).map_err(|error| placed.refused(None, &error.to_string()))?;
             let supplied = placed.supply(drive.as_mut());
             prepare(spec.node.raw(), drive.as_mut());
-            world.set_timing(self.timing_of(placed, TimingMode::Ideal));
+            world.set_timing(self.timing_of(placed));
             let added = world.add_drive(spec.node.raw(), drive);
             added.map_err(|error| placed.refused(None, &error.to_string()))?;
             for refused in [supplied, placed.furnish(&mut world)] {

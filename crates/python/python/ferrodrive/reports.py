@@ -93,6 +93,7 @@ class Tuning(TypedDict):
     frequencies: int
     model_off: float
     twin_off: float
+    period_ms: Optional[float]
     gain_share: float
     peak_a: float
     travel_turns: float

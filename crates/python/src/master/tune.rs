@@ -30,7 +30,7 @@ pub(crate) struct TuneOrder {
     #[pyo3(item)]
     travel_turns: f64,
     #[pyo3(item)]
-    period: f64,
+    period: Option<f64>,
     #[pyo3(item)]
     torque_constant_nm_a: Option<f64>,
     #[pyo3(item)]
@@ -56,7 +56,7 @@ pub(crate) fn tune_drive(
         speed_rpm: order.speed_rpm,
         current_a: order.current_a.unwrap_or(Bounds::default().current_a),
         travel_turns: order.travel_turns,
-        period_ms: duration(order.period)?.as_secs_f64() * 1e3,
+        period_ms: order.period.map(|period| Ok::<_, PyErr>(duration(period)?.as_secs_f64() * 1e3)).transpose()?,
         torque_constant_nm_a: order.torque_constant_nm_a,
     };
     let request = wanted.request(Bounds::default().speed_rpm, CyclicOptions::default(), asked.journal(order.journal));

@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn a_run_in_which_nothing_is_random_gives_those_of_other_seeds_and_of_no_other_value() {
-        let sweep = sweep("");
+        let sweep = sweep("timing = 'ideal'");
         let alike = Alike::default();
         assert_eq!(alike.of(&sweep, 0), None);
         alike.keep(&sweep, 0, &sweep.run(0).expect("a run"));
@@ -66,10 +66,10 @@ mod tests {
     #[test]
     fn a_run_in_which_anything_is_random_gives_nothing_for_another() {
         let sources = [
-            "realism = 'full'",
+            "realism = 'full'\ntiming = 'ideal'",
             "timing = 'device'",
-            "[[step]]\nat = '0s'\ndo = 'bus corrupt 0.5'",
-            "[[step]]\nat = '0s'\ndo = '4 bus late 5 20'",
+            "timing = 'ideal'\n[[step]]\nat = '0s'\ndo = 'bus corrupt 0.5'",
+            "timing = 'ideal'\n[[step]]\nat = '0s'\ndo = '4 bus late 5 20'",
         ];
         for source in sources {
             let sweep = sweep(source);

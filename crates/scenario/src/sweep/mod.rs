@@ -133,7 +133,7 @@ impl Sweep {
         let Machine { realism, timing, .. } = self.scenario.machine;
         let realism =
             (realism.unwrap_or_default() == Realism::Ideal).then_some("realism = \"full\" (noise of sensors)");
-        let timing = (timing != Some(TimingMode::Device)).then_some("timing = \"device\" (jitter of answers)");
+        let timing = (timing == Some(TimingMode::Ideal)).then_some("timing = \"device\" (jitter of answers)");
         realism.into_iter().chain(timing).collect::<Vec<_>>().join(" and ")
     }
 

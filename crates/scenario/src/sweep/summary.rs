@@ -262,7 +262,7 @@ mod tests {
     use words::document::BadFile;
 
     fn sweep(seeds: u64) -> Sweep {
-        let text = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n[parameters]\na = 1\nb = 'x'\n\
+        let text = "machine = { timing = 'ideal', drive = [{ model = 'zlac8030l', node = 4 }] }\n[parameters]\na = 1\nb = 'x'\n\
                     [sweep]\na = { from = 0, to = 1, step = 0.1 }\nb = ['x', 'it is']\n";
         let scenario = Scenario::parse(text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
         Sweep::new(scenario, 1..=seeds).expect("a sweep")

@@ -7,7 +7,11 @@ use scenario::{Outcome, Runner, Scenario, Verdict};
 const MACHINE: &str = "machine = { drive = [{ model = 'zlac8030l', node = 4 }] }\n";
 
 fn run(rest: &str) -> Outcome {
-    let scenario = Scenario::parse(&format!("{MACHINE}{rest}"), Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
+    run_whole(&format!("{MACHINE}{rest}"))
+}
+
+fn run_whole(text: &str) -> Outcome {
+    let scenario = Scenario::parse(text, Path::new("")).unwrap_or_else(|bad| panic!("{bad}"));
     Runner::new(&scenario, None).unwrap_or_else(|bad| panic!("{bad}")).run()
 }
 
@@ -339,9 +343,11 @@ fn a_drive_that_one_host_measures_is_not_measured_or_moved_in_cycles_by_another(
 /// 0.03 kg m² at the shaft, and the rotor: within 5 %. The drive has the gains then that its row names (201Dh).
 #[test]
 fn gains_are_found_for_a_drive_and_tried() {
-    let outcome = run(
-        "[[step]]\nat = '0s'\ndo = '4 load inertia 0.03'\n[[host]]\ndo = ['4 tune speed 60rpm apply', '4 read 201D']\n",
-    );
+    // A cycle of 1 ms takes a bus of 1 Mbit/s.
+    let machine = MACHINE.replacen("drive =", "bitrate = '1M', drive =", 1);
+    let outcome = run_whole(&format!(
+        "{machine}[[step]]\nat = '0s'\ndo = '4 load inertia 0.03'\n[[host]]\ndo = ['4 tune speed 60rpm apply', '4 read 201D']\n",
+    ));
     assert!(outcome.passed(), "{:#?}", outcome.rows);
     let (_, seen) = row(&outcome, "4 tune");
     let rotor = host::tune::motor_of(devices::model("zlac8030l").unwrap()).unwrap().rotor.inertia_kg_m2;

@@ -67,7 +67,7 @@ mod tests {
 
     /// A drive that turns for a second, in virtual time.
     fn runner() -> Runner {
-        let text = "end = \"1s\"\n[machine]\ndrive = [{ model = \"zlac8030l\", node = 4 }]\n\
+        let text = "end = \"1s\"\n[machine]\ntiming = \"ideal\"\ndrive = [{ model = \"zlac8030l\", node = 4 }]\n\
                     [[host]]\ndo = [\"4 write 2000 0\", \"4 velocity 60rpm\"]\n";
         let scenario = Scenario::parse(text, Path::new("")).expect("a scenario");
         let mut runner = Runner::new(&scenario, None).expect("a machine");

@@ -80,9 +80,11 @@ pub(crate) struct Tune {
     /// A number alone is turns.
     #[arg(long, value_name = "ANGLE", default_value = "40turn", value_parser = turns)]
     travel: f64,
-    /// Time from one sample to the next
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = period)]
-    period: Duration,
+    /// Time from one sample to the next (default: 1, 2, 5 or 10 ms)
+    ///
+    /// Without it the shortest in which no sample is missing: a bus of 500 kbit/s has no room for 1 ms.
+    #[arg(long, value_name = "TIME", value_parser = period)]
+    period: Option<Duration>,
     /// Torque per ampere of another motor than the model's own, in N·m/A
     #[arg(long, value_name = "NM_PER_A")]
     torque_constant: Option<f64>,
@@ -125,7 +127,6 @@ pub(crate) struct Tune {
 
 /// What is usual of the options that not every drive has.
 const PHASE_MARGIN_DEG: f64 = 40.0;
-const PERIOD: Duration = Duration::from_millis(1);
 const MARGIN: f64 = 1.5;
 
 /// Refuses the first of these options that is given.
@@ -225,7 +226,7 @@ impl Tune {
             ("--phase-margin", self.phase_margin != PHASE_MARGIN_DEG),
             ("--current", self.current.is_some()),
             ("--travel", self.travel != Bounds::default().travel_turns),
-            ("--period", self.period != PERIOD),
+            ("--period", self.period.is_some()),
             ("--torque-constant", self.torque_constant.is_some()),
         ];
         let why = "its ramps are computed: it is not turned, and has no loops and no frequency response";

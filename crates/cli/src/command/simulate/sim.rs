@@ -212,7 +212,7 @@ impl Sim {
         let eeproms = self.state.as_deref().map(Eeproms::open).transpose().map_err(words::failure::Failure::from)?;
         let mut world = machine.world();
         for placed in &machine.drives {
-            world.set_timing(machine.timing_of(placed, TimingMode::Device));
+            world.set_timing(machine.timing_of(placed));
             let order = machine.order_of(placed, world.bitrate());
             add_drive(&mut world, (placed, &order), eeproms.as_ref(), &warnings)?;
             let notes = notes(placed.spec.node, placed.spec.model, self.verbose || global.verbose);
