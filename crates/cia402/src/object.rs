@@ -15,6 +15,8 @@ canopen::objects! {
     VL_VELOCITY_MIN_AMOUNT = 0x6046, 1;
     /// vl velocity min max amount (velocity mode): the greatest speed, in units of 6044h.
     VL_VELOCITY_MAX_AMOUNT = 0x6046, 2;
+    /// Quick stop option code: by which ramp, and whether the drive stays in Quick stop active.
+    QUICK_STOP_OPTION_CODE = 0x605A, 0;
     /// Modes of operation: the mode that is asked for.
     MODES_OF_OPERATION = 0x6060, 0;
     /// Modes of operation display: the mode in effect.

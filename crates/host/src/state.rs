@@ -8,6 +8,7 @@ use can::{Bitrate, Instant};
 use canopen::NodeId;
 use devices::Description;
 use futures_util::stream::FuturesUnordered;
+use machine::file::GroupPlan;
 use master::plan::NodeTraffic;
 use master::{Gear, Network};
 
@@ -53,6 +54,8 @@ pub struct Setting {
     pub models: BTreeMap<NodeId, &'static Description>,
     /// The gears behind the shafts of drives, if any.
     pub gears: BTreeMap<NodeId, Gear>,
+    /// The groups of the machine file: what their axes may do.
+    pub groups: Vec<GroupPlan>,
     /// Name of the bus in a log: that of its CAN interface, or `can0`.
     pub interface: String,
     /// Unix time of the bus's zero, for a log.

@@ -184,6 +184,7 @@ fn setting() -> Setting {
         timeout: Duration::from_millis(100),
         models: BTreeMap::new(),
         gears: BTreeMap::new(),
+        groups: Vec::new(),
         interface: "can0".into(),
         unix_zero: Duration::from_secs(1_700_000_000),
         journals: None,

@@ -255,8 +255,19 @@ impl GroupMove {
     /// # Errors
     /// No axis, one that is named twice, or axes that are not of one group.
     pub fn axes<'a>(&self, machine: Option<&'a Machine>) -> Result<(Vec<NodeId>, Option<&'a GroupPlan>), Failure> {
+        self.axes_in(machine.map(|machine| &*machine.groups))
+    }
+
+    /// The same with the groups of a file, if there is one.
+    ///
+    /// # Errors
+    /// Those of [`axes`](Self::axes).
+    pub fn axes_in<'a>(
+        &self,
+        groups: Option<&'a [GroupPlan]>,
+    ) -> Result<(Vec<NodeId>, Option<&'a GroupPlan>), Failure> {
         self.check()?;
-        let plan = self.of_file(machine)?;
+        let plan = self.of_file(groups)?;
         let nodes = match plan {
             Some(plan) => plan.axes.iter().map(|axis| axis.node).collect(),
             None => self.targets.iter().map(|(node, _)| *node).collect(),
@@ -264,8 +275,8 @@ impl GroupMove {
         Ok((nodes, plan))
     }
 
-    fn of_file<'a>(&self, machine: Option<&'a Machine>) -> Result<Option<&'a GroupPlan>, Failure> {
-        let groups = machine.map_or(&[][..], |machine| &machine.groups);
+    fn of_file<'a>(&self, of_file: Option<&'a [GroupPlan]>) -> Result<Option<&'a GroupPlan>, Failure> {
+        let groups = of_file.unwrap_or_default();
         let names = || groups.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", ");
         let has = |group: &&GroupPlan, node: NodeId| group.axes.iter().any(|axis| axis.node == node);
         let Some(name) = &self.group else {
@@ -282,7 +293,7 @@ impl GroupMove {
             let what = format!("there is no group '{name}'");
             let advice = "a group is a [[group]] of a machine file (docs/machine-file.md); give that file";
             return Err(match groups {
-                [] if machine.is_none() => Failure::usage(what).next(advice),
+                [] if of_file.is_none() => Failure::usage(what).next(advice),
                 [] => Failure::bad_file(what).next(advice),
                 _ => Failure::bad_file(what).next(format!("the machine file has: {}", names())),
             });

@@ -151,6 +151,9 @@ def test_a_recorded_path_that_cannot_be_followed_moves_nothing(world, network, t
 
 def test_what_breaks_a_limit_moves_nothing(world, network):
     with network.group(servos(range_deg=(-180, 180)), period=0.001) as group:
+        for wrong in [{1: 30, 2: -20}, "12"]:
+            with pytest.raises(TypeError, match="in the order of the group"):
+                group.move(wrong)
         for wrong, said in [([181, 0], "outside its software limits"), ([0], "2 axes"), ([math.nan, 0], "finite number")]:
             with pytest.raises(ferrodrive.MasterError, match=said):
                 group.move(wrong)

@@ -119,6 +119,7 @@ impl HostedWorld {
             timeout: TIMEOUT,
             models: machine.models().collect(),
             gears: machine.models().map(|(node, _)| (node, machine.gear(node))).collect(),
+            groups: machine.groups.clone(),
             interface: "can0".into(),
             unix_zero,
             journals: None,

@@ -112,6 +112,7 @@ impl SerialHost {
             timeout: TIMEOUT,
             models: Default::default(),
             gears: Default::default(),
+            groups: Vec::new(),
             interface: "can0".into(),
             unix_zero,
             journals: None,

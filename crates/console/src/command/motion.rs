@@ -5,7 +5,8 @@ use std::pin::pin;
 use std::time::Duration;
 
 use canopen::NodeId;
-use cia402::ModeOfOperation;
+use cia402::object::QUICK_STOP_OPTION_CODE;
+use cia402::{ModeOfOperation, QuickStopOption, StopRamp};
 use devices::{Quantity, Ramps, Scale};
 use master::drive::{Commanded, Drive, Manner, Motion, MotionReport, Note};
 use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
@@ -399,12 +400,20 @@ async fn limits(drive: &Drive) -> ProfileLimits {
     let number = async |object, scale| drive.read_quantity(Quantity { object, scale }).await.ok();
     let ms = Scale::PerCount(1.0);
     match axis.units.ramps {
-        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => ProfileLimits {
-            acceleration_ms: number(acceleration, ms).await,
-            deceleration_ms: number(deceleration, ms).await,
-            quick_stop_ms: number(quick_stop, ms).await,
-            ..limits
-        },
+        Some(Ramps::Times { acceleration, deceleration, quick_stop }) => {
+            let option = drive.node().read::<i16>(axis.object(QUICK_STOP_OPTION_CODE)).await.ok();
+            // 605Ah chooses between the two ramps.
+            let by = match option.and_then(|option| QuickStopOption(option).ramp()) {
+                Some(StopRamp::SlowDown) => deceleration,
+                _ => quick_stop,
+            };
+            ProfileLimits {
+                acceleration_ms: number(acceleration, ms).await,
+                deceleration_ms: number(deceleration, ms).await,
+                quick_stop_ms: number(by, ms).await,
+                ..limits
+            }
+        }
         Some(Ramps::Rates { acceleration, scale, .. }) => {
             ProfileLimits { acceleration_rpm_s: number(acceleration, scale).await, ..limits }
         }

@@ -130,7 +130,7 @@ impl Track {
         });
         let targets: Vec<_> = axes.map(|(node, begin, _)| format!("{node}={}deg", degrees(begin))).collect();
         Err(failure
-            .next(format!("move there first: group move {}", targets.join(" ")))
-            .next("or ask to approach it (--approach; approach=True in Python): all axes are led there together, within their limits"))
+            .next("ask to approach it (--approach; approach=True in Python): all axes are led there together, within their limits")
+            .next(format!("or move there before, where they stay without power: group move {}", targets.join(" "))))
     }
 }

@@ -11,13 +11,13 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::NodeId;
-use machine::file::speed_mode;
+use machine::file::{GroupPlan, speed_mode};
 use machine::group_move::{self, PULLING_LOAD};
 use master::Drive;
 use master::base::{Base, BaseError, BaseLimits, Geometry, Twist, WheelSetup};
 use master::cyclic::CyclicOptions;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, StreamOptions};
-use master::units::{Along, Angle, Rpm, Turns};
+use master::units::{Along, Angle, Rpm, Shown, Turns};
 
 use crate::answer::Answer;
 use crate::command::{AxisSpeed, BaseJog, GroupCommand, GroupMove};
@@ -53,13 +53,26 @@ impl Host {
             }
             GroupCommand::GroupEnd {} => self.hold_group(asked, |wanted| wanted.released = true),
             GroupCommand::GroupMove(asked_for) => {
-                let nodes: Vec<_> = asked_for.axes.iter().map(|axis| axis.node).collect();
+                let planned = together(asked_for).and_then(|wanted| {
+                    let (nodes, plan) = wanted.axes_in(Some(&self.setting.groups)).map_err(|failure| {
+                        let (kind, text) = crate::capture::refusal(&failure);
+                        (if failure.is_usage { "malformed" } else { kind }, text)
+                    })?;
+                    Ok((nodes, plan.cloned(), wanted))
+                });
+                let (nodes, plan, wanted) = match planned {
+                    Ok(planned) => planned,
+                    Err((kind, text)) => return send(asked.1, Answer::failed(Some(asked.0), kind, text)),
+                };
                 self.begin_group(&nodes, "moving together", false, asked, move |drives, _| {
-                    Box::pin(move_together(drives, asked_for))
+                    Box::pin(move_together(drives, plan, wanted))
                 });
             }
             GroupCommand::GroupJog { axes, rpm_per_s } => {
                 let nodes: Vec<_> = axes.iter().map(|axis| axis.node).collect();
+                if let Some(text) = axes.iter().find_map(|axis| too_fast(axis, &self.setting.groups)) {
+                    return send(asked.1, Answer::failed(Some(asked.0), "group", text));
+                }
                 self.begin_group(&nodes, "turning together", true, asked, move |drives, wanted| {
                     Box::pin(turn_together(drives, axes, rpm_per_s, wanted))
                 });
@@ -249,27 +262,47 @@ fn limits(rpm: f64, rpm_per_s: Option<f64>) -> AxisLimits {
     }
 }
 
-async fn move_together(drives: Vec<Drive>, asked: GroupMove) -> GroupOutcome {
+/// A file's limit for an axis is that of a speed that is held too.
+fn too_fast(axis: &AxisSpeed, groups: &[GroupPlan]) -> Option<String> {
+    let mut axes = groups.iter().flat_map(|group| group.axes.iter().map(move |axis| (group, axis)));
+    let (group, said) = axes.find(|(_, said)| said.node == axis.node)?;
+    let most_rpm = said.limits.velocity_turns_s * 60.0;
+    (axis.rpm.abs() > most_rpm * (1.0 + 1e-9)).then(|| {
+        let (rpm, most) = (Shown(axis.rpm.abs()), Shown(most_rpm));
+        format!(
+            "node {}: {rpm} r/min are more than {most} r/min, its limit in the group '{}' of the machine file",
+            axis.node, group.name
+        )
+    })
+}
+
+/// The move that a page asks for.
+fn together(asked: GroupMove) -> Result<group_move::GroupMove, Refusal> {
     let GroupMove { axes, relative, rpm, rpm_per_s, within_s } = asked;
     let within = match within_s.map(Duration::try_from_secs_f64).transpose() {
         Ok(within) => within,
         Err(_) => return Err(("malformed", "expected a time above 0 in seconds".into())),
     };
-    let asked = group_move::GroupMove {
+    Ok(group_move::GroupMove {
         targets: axes.iter().map(|axis| (axis.node, Along::Turning(Angle::Turns(axis.degrees / 360.0)))).collect(),
         relative,
         within,
         velocity: rpm.map(Rpm),
         acceleration: rpm_per_s.map(|rate| rate / 60.0),
-        period: Some(PERIOD),
         ..group_move::GroupMove::default()
-    };
-    let planned = asked.plan(None, drives).await.map_err(refusal)?;
+    })
+}
+
+/// With a plan of the machine file within its limits and in its period; the axes that have no target stay where they are, powered.
+async fn move_together(drives: Vec<Drive>, plan: Option<GroupPlan>, mut asked: group_move::GroupMove) -> GroupOutcome {
+    let nodes: Vec<_> = drives.iter().map(|drive| drive.node().id()).collect();
+    asked.period = if plan.is_some() { None } else { Some(PERIOD) };
+    let planned = asked.plan(plan.as_ref(), drives).await.map_err(refusal)?;
     let mut group = planned.open(options()).await.map_err(refusal)?;
     let moved = planned.carry_out(&mut group, |_, _| {}).await.map(|run| {
-        let lags = axes.iter().zip(&run.largest_turns);
-        let lags: Vec<_> = lags.map(|(axis, turns)| format!("node {} {:.1} deg", axis.node, turns * 360.0)).collect();
-        let time = format!("{} drives moved together in {:.3} s", axes.len(), run.time.as_secs_f64());
+        let lags = nodes.iter().zip(&run.largest_turns);
+        let lags: Vec<_> = lags.map(|(node, turns)| format!("node {node} {:.1} deg", turns * 360.0)).collect();
+        let time = format!("{} drives moved together in {:.3} s", nodes.len(), run.time.as_secs_f64());
         vec![format!("{time}; largest lag: {}. They are disabled now: {PULLING_LOAD}", lags.join(", "))]
     });
     close(group, moved).await

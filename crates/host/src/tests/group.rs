@@ -316,3 +316,36 @@ fn a_base_is_driven_by_its_twist() {
         assert!(stage.speed(WHEEL).await < 2.0);
     });
 }
+
+/// Limits of the machine file are those of a page too: a joint is not driven over its range because it was asked for by a browser.
+#[test]
+fn a_group_of_the_machine_file_moves_within_its_limits() {
+    let axis = |node: u8| {
+        format!(
+            "{{ node = {node}, range_deg = [-170, 170], velocity_deg_s = 60, acceleration_deg_s2 = 120, jerk_deg_s3 = 1200, following_error_deg = 20 }}"
+        )
+    };
+    let text = format!(
+        "[[drive]]\nmodel = 'zlac8030l'\nnode = 4\n[[drive]]\nmodel = 'zlim42c'\nnode = 2\n\
+         [[group]]\nname = 'arm'\nperiod = '20ms'\naxis = [{}, {}]\n",
+        axis(4),
+        axis(2)
+    );
+    let groups = machine::file::Machine::parse(&text).unwrap_or_else(|bad| panic!("{bad}")).groups;
+    let scene = async |stage: &Stage| {
+        let mut page = stage.page().await;
+        stage.scanned().await;
+        page.take_control_of_all().await;
+        let beyond = page.ask(move_to(200.0, 0.0)).await;
+        assert!(beyond.json().to_string().contains("outside its software limits"), "{beyond:?}");
+        // 61 deg/s.
+        let fast = page.ask(jog(61.0 / 6.0, 1.0)).await;
+        assert!(fast.json().to_string().contains("its limit in the group 'arm'"), "{fast:?}");
+        // 60 degrees at 60 deg/s.
+        let began = stage.network.now();
+        page.must(move_to(60.0, -30.0)).await;
+        assert!(stage.network.now() - began > Duration::from_secs(1));
+    };
+    let setting = super::Setting { groups, ..super::setting() };
+    super::play_in(setting, scene, |_| {}, async |_| {}, |_| {}, async |_| {});
+}

@@ -7,9 +7,10 @@ use std::time::Duration;
 use canopen::object::{GUARD_TIME, LIFE_TIME_FACTOR, PRODUCER_HEARTBEAT_TIME};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 use canopen::{Mux, NodeId};
-use cia402::object::{MAX_POSITION_LIMIT, MIN_POSITION_LIMIT};
+use cia402::object::{MAX_POSITION_LIMIT, MIN_POSITION_LIMIT, MODES_OF_OPERATION};
 use devices::Description;
 use master::core::PdoMap;
+use master::parameters::is_command;
 use master::pdo::{PdoConfig, TransmissionType, record_of, values_off};
 use master::units::parse_duration;
 
@@ -65,13 +66,29 @@ pub(super) fn values(
     if let Some(field) = table.get("start_up") {
         match field.table("the values at the start", START_UP).map_err(|problem| vec![problem]) {
             Ok(table) => match values_of(&table, Some(model)) {
-                Ok(values) => all.add(&field, Ok(values.into_iter().collect())),
+                Ok(values) => {
+                    all.problems.extend(values.keys().filter_map(|object| set_point(*object, &field, model)));
+                    all.add(&field, Ok(values.into_iter().collect()));
+                }
                 Err(wrong) => all.problems.extend(wrong),
             },
             Err(wrong) => all.problems.extend(wrong),
         }
     }
     all.values
+}
+
+/// A drive would move by it as soon as it has power. The mode alone moves nothing.
+fn set_point(object: Mux, field: &Field<'_>, model: &Description) -> Option<Problem> {
+    let is_mode = model.axes.iter().any(|axis| axis.object(MODES_OF_OPERATION) == object);
+    let moves = !model.axes.is_empty() && is_command(object, Some(model)) && !is_mode;
+    moves.then(|| {
+        let name = model.row(object).map_or("", |row| row.name);
+        field.problem(format!(
+            "{object} {name} is a command or a set-point, by which the drive would move when it is enabled; expected settings alone; \
+             ferrodrive move, velocity or a line of a host is what moves it"
+        ))
+    })
 }
 
 /// The record of an SDO server by its number, 1 to 128: 1200h is the first, which every node has. Source: CiA 301, 7.5.2.33.
@@ -365,5 +382,11 @@ mod tests {
         assert!(refusal("limits = { pace = 5 }").contains("has no 'pace'"));
         assert!(refusal("start_up = { 1017 = 5 }\nheartbeat = '5ms'").contains("1017h:00 gets a value twice"));
         assert!(refusal("start_up = { 6066 = 70000 }").contains("6066h:00"));
+        for moving in ["60FF = 60", "target_position = 100", "6040 = 15"] {
+            assert!(
+                refusal(&format!("start_up = {{ {moving} }}")).contains("would move when it is enabled"),
+                "{moving}"
+            );
+        }
     }
 }

@@ -23,5 +23,5 @@ pub use order::{ParameterStep, Purpose, from_any_state, in_order};
 pub use plan::{Plan, PlanOptions};
 pub use read::{Backup, Deviation, verify};
 pub use undone::{NotPutBack, Undone, roll_back};
-pub(crate) use values::is_command;
+pub use values::is_command;
 pub use values::{Difference, Left, Parameters, default_of, diff, wanted_of};

@@ -127,7 +127,7 @@ pub fn wanted_of(model: &Description) -> Vec<Mux> {
 }
 
 /// True for an object that is not written to configure a device: a command, a set-point.
-pub(crate) fn is_command(object: Mux, model: Option<&Description>) -> bool {
+pub fn is_command(object: Mux, model: Option<&Description>) -> bool {
     let by_standard = Entry::new(object.index, object.sub_index, DataType::Unsigned32, Access::ReadWrite, "", "");
     !is_parameter(&by_standard) || model.and_then(|model| model.row(object)).is_some_and(|row| row.command)
 }

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Optional, Union, cast
@@ -188,12 +188,13 @@ class Group(_Open):
         :param to_deg: a position of each axis in degrees
         :param within: how long it takes in s; without it the shortest time within the limits
         :raises MasterError: a position or the time breaks a limit, and nothing moves; or what stopped the group on its way
+        :raises TypeError: it is no sequence of numbers: of a mapping by node nothing is known about the order
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     round(group.move([10], within=2), 3)
         2.0
         """
-        time: float = self.network._finish(self._native.move_to(list(to_deg), within))
+        time: float = self.network._finish(self._native.move_to(_positions(to_deg), within))
         return time
 
     def follow(self, points_deg: Sequence[Sequence[float]]) -> None:
@@ -348,7 +349,7 @@ class AsyncGroup(_AsyncOpen):
 
     async def move(self, to_deg: Sequence[float], within: Optional[float] = None) -> float:
         """As :meth:`Group.move`."""
-        time: float = await self.network._finish_soon(self._native.move_to(list(to_deg), within))
+        time: float = await self.network._finish_soon(self._native.move_to(_positions(to_deg), within))
         return time
 
     async def follow(self, points_deg: Sequence[Sequence[float]]) -> None:
@@ -413,6 +414,13 @@ def _open_group(native: NativeGroup, axes: Union[str, Sequence[Axis]], period: O
     if isinstance(axes, str):
         return native.open_of_file(axes, period, tolerance)
     return native.open([_order(axis) for axis in axes], GROUP_PERIOD if period is None else period, tolerance)
+
+
+def _positions(to_deg: Sequence[float]) -> list[float]:
+    """Of a mapping the keys would be taken, which are nodes."""
+    if isinstance(to_deg, (Mapping, str, bytes)):
+        raise TypeError(f"to_deg is {to_deg!r}; expected a position in degrees of each axis, in the order of the group, e.g. [30, -20]")
+    return list(to_deg)
 
 
 def _open_base(native: NativeBase, order: Optional[dict[str, Any]], period: Optional[float], tolerance: int) -> Job:

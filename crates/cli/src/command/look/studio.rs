@@ -161,6 +161,7 @@ pub(in crate::command) fn setting(context: &Context) -> Setting {
         timeout: context.timeout(),
         models: context.stated_models(),
         gears: context.gears(),
+        groups: context.machine.as_ref().map(|machine| machine.groups.clone()).unwrap_or_default(),
         interface: interface_of(context.bus()).name().to_owned(),
         journals: journals(context),
         unix_zero: context.traffic.unix_zero(),
