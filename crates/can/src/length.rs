@@ -101,7 +101,7 @@ const CRC_OF_NIBBLE: [u16; 16] = {
         let mut bit = 0;
         while bit < 4 {
             let feedback = crc >> (CRC_BITS - 1) & 1;
-            crc = crc << 1 & 0x7FFF ^ feedback * CRC_POLYNOMIAL;
+            crc = crc << 1 & 0x7FFF ^ (feedback * CRC_POLYNOMIAL);
             bit += 1;
         }
         table[nibble] = crc;

@@ -186,7 +186,9 @@ async fn real_bus<R>(global: &Global, command: impl AsyncFnOnce(&Context) -> Res
     let mut context = Context::new(global, network.clone(), embedded.as_deref(), progress.clone(), traffic.clone());
     context.true_values = world.as_ref().and_then(WorldDoor::values).cloned();
     (context.world, context.wire) = (world, health);
-    if let Some(unused) = global.machine.as_ref().filter(|_| embedded.is_none()).and_then(Machine::unused_by_a_master) {
+    if let Some(unused) =
+        global.machine.as_ref().filter(|_| global.verbose && embedded.is_none()).and_then(Machine::unused_by_a_master)
+    {
         let text = format!(
             "of the machine file a command on a real bus does not use: {unused}; `ferrodrive sim --machine FILE` and `ferrodrive run` do"
         );

@@ -198,7 +198,10 @@ impl Context {
             .of_kind("unknown_model")
             .at_node(id)
             .because("its identity (1018h) and objects fit no model, or more than one")
-            .next(format!("name it with --model {id}=MODEL, where MODEL is one of: {}", models::names())))
+            .next(format!(
+                "name it with --model {id}=FILE.eds, its maker's data sheet, or --model {id}=MODEL, where MODEL is one of: {}",
+                models::names()
+            )))
     }
 
     /// A drive, of a known model or not. A guess is reported.

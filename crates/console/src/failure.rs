@@ -163,7 +163,11 @@ impl From<master::Error> for Failure {
             Error::WrongModel { node, .. } | Error::OtherModel { node, .. } => Some(format!(
                 "omit --model {node}=.., see what `ferrodrive scan` shows for it, or correct the machine file"
             )),
-            Error::UnknownModel { node, .. } => Some(name_its_model(*node, &["MODEL"])),
+            // Where one can be enabled that is not known it has to be stopped, too.
+            Error::UnknownModel { node, intent: "stop it" } => {
+                Some(format!("ferrodrive quick-stop {node} or estop, which need no model"))
+            }
+            Error::UnknownModel { node, .. } => Some(name_its_model(*node, &["MODEL", "FILE.eds"])),
             _ => None,
         };
         advice.into_iter().fold(words::failure::Failure::from(error).into(), Self::next)

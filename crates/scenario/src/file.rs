@@ -251,6 +251,15 @@ impl Scenario {
                     Some(plan) => asked.check(plan, &plan.limits).err().map(|failure| failure.one_line()),
                 },
                 Command::Boot(options) => stranger(&options.nodes),
+                // What is moved has to be known; a line that is to fail may ask a node that is not there.
+                Command::Drive(place, _)
+                | Command::Capture(place, _)
+                | Command::TestMotion(place, _)
+                | Command::Tune(place, _)
+                    if line.wanted.fails.is_none() && !self.has_node(place.node) =>
+                {
+                    Some(self.no_such(*place))
+                }
                 Command::Parameters(node, ..) => stranger(&[*node]),
                 _ => None,
             };

@@ -183,6 +183,9 @@ fn integer(text: &str) -> Option<i64> {
 }
 
 fn with_unit(row: &Entry, text: &str, number: f64, unit: &str) -> Result<i64, String> {
+    if TYPES.iter().any(|(word, _)| *word == unit) {
+        return Err(format!("a type stands before the value: {unit}:{number}"));
+    }
     let Some(own) = Unit::of_object(row.unit) else {
         return Err(format!("{} has no unit; expected a whole number, e.g. {}", row.mux(), example(row)));
     };
@@ -297,6 +300,7 @@ mod tests {
         assert_eq!(error, format!("99999999999999999999 does not fit 60FFh:00 (INTEGER32): {beyond}"));
         assert!(value(&SPEED, "1e12rpm").unwrap_err().ends_with(&format!("counts of 60FFh:00; {beyond}")));
         assert!(value(&WORD, "").is_err());
+        assert_eq!(value(&SPEED, "100u32").unwrap_err(), "a type stands before the value: u32:100");
     }
 
     #[test]

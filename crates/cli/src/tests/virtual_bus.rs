@@ -42,7 +42,7 @@ impl VirtualBus {
         Self::of_machine(&machine)
     }
 
-    /// The drives of a machine file, which have booted; they take no time for what they do, unless the file says so.
+    /// The drives of a machine file, which have booted; they take no time for what they do, unless the file has `timing`.
     #[track_caller]
     pub(super) fn of_machine(machine: &Machine) -> Self {
         let mut machine = machine.clone();

@@ -21,7 +21,7 @@ use words::models::is_from_file;
 use words::node::node;
 use words::time::some_time;
 
-/// Turn the motor at a speed
+/// Turn the motor at a speed; without --for it keeps turning after this command
 ///
 /// Enables the drive and returns when the speed is reached; the motor keeps turning. With --for it is stopped
 /// afterwards.

@@ -8,13 +8,12 @@ use master::cyclic::CyclicOptions;
 use words::failure::{Failure, both};
 
 use super::bench::{Bench, Bounds, CURRENT_KIND, Excursion, LATE_KIND, Measurement, excitation};
-use super::report::{Request, SAMPLE_PERIODS};
 use super::setup::Setup;
 
 /// How often gains are halved before a speed loop that swings is given up.
 const HALVINGS: u32 = 4;
 
-/// Measures a drive in the period that was asked for, or in the shortest of [`SAMPLE_PERIODS`] in which no sample is missing.
+/// Measures a drive in the first of these periods in which no sample is missing.
 ///
 /// # Errors
 /// As [`measure`].
@@ -22,13 +21,12 @@ pub(super) async fn measure_in_time(
     drive: &Drive,
     setup: &Setup,
     loops: &Loops,
-    request: &Request,
+    (periods, bounds, options): (&[Duration], Bounds, CyclicOptions),
     excursion: &mut Excursion,
 ) -> Result<(Duration, Measurement), Failure> {
-    let periods = request.period.as_ref().map_or(&SAMPLE_PERIODS[..], std::slice::from_ref);
     let mut late = None;
     for &period in periods {
-        match measure(drive, setup, loops, (period, request.bounds, request.cyclic), excursion).await {
+        match measure(drive, setup, loops, (period, bounds, options), excursion).await {
             Err(failure) if failure.kind == LATE_KIND => late = Some(failure),
             measured => return measured.map(|measured| (period, measured)),
         }

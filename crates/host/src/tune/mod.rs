@@ -67,6 +67,6 @@ pub fn loops_of(drive: &Drive) -> Result<(&'static Description, &'static Loops),
             .at_node(id)
             .of_kind("no_gains")
             .because("its description names no gains of a speed loop")
-            .next("ferrodrive objects MODEL lists what can be set by hand; a stepper has ramps and currents instead of gains")
+            .next("of a servo by CiA 402 `loops` of its [[drive]] in a machine file names the objects of its gains (docs/machine-file.md); a stepper has ramps and currents instead of gains")
     })
 }

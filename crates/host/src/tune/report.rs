@@ -74,6 +74,12 @@ pub struct Request {
 }
 
 impl Request {
+    /// The periods that are tried, and what the motion keeps to.
+    fn in_cycles(&self) -> (&[Duration], Bounds, CyclicOptions) {
+        let periods = self.period.as_ref().map_or(&SAMPLE_PERIODS[..], std::slice::from_ref);
+        (periods, self.bounds, self.cyclic)
+    }
+
     /// Whether a measurement can be made so.
     ///
     /// # Errors
@@ -239,7 +245,7 @@ pub async fn find(
             (None, found, twin, off, Vec::new())
         }
         _ => {
-            let measured = measure_in_time(drive, &had, loops, request, excursion).await;
+            let measured = measure_in_time(drive, &had, loops, request.in_cycles(), excursion).await;
             let (period, measured) = both(measured, had.put_back(drive).await)?;
             let own = constant_of((model, loops), &motor, had.rated_constant());
             let constant = request.torque_constant_nm_a.or(loops.torque_constant_nm_a).unwrap_or(own);

@@ -188,7 +188,7 @@ class Group(_Open):
         :param to_deg: a position of each axis in degrees
         :param within: how long it takes in s; without it the shortest time within the limits
         :raises MasterError: a position or the time breaks a limit, and nothing moves; or what stopped the group on its way
-        :raises TypeError: it is no sequence of numbers: of a mapping by node nothing is known about the order
+        :raises TypeError: a mapping or a text, whose keys or characters would be taken for positions
 
         >>> with network.group([ferrodrive.Axis(5, "cia402", mode="csp")]) as group:
         ...     round(group.move([10], within=2), 3)

@@ -366,6 +366,8 @@ fn a_base_a_node_and_a_file_that_are_not_there_are_refused_before_the_run() {
     for (line, said) in [
         ("drive-base linear 0.3 for 2s", "the machine has no [base]"),
         ("boot node 9", "the machine has no node 9; it has: 1, 2"),
+        ("9 velocity 60rpm", "the machine has no node 9; it has: 1, 2"),
+        ("9 tune", "the machine has no node 9; it has: 1, 2"),
         ("9 params verify", "the machine has no node 9; it has: 1, 2"),
         ("1 params apply missing.toml", "cannot read missing.toml as parameters"),
         ("1 params apply", "the machine file has no settings for node 1"),
