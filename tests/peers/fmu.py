@@ -139,6 +139,7 @@ SCENARIO = """
 title = "a load turns a wheel whose supply sags"
 end = "2s"
 [machine]
+timing = "ideal"
 drive = [{ model = "zlac8030l", node = 4 }]
 [[step]]
 at = "1700ms"
@@ -409,6 +410,7 @@ TALKED = """
 title = "what a host says to two drives"
 end = "2201ms"
 [machine]
+timing = "ideal"
 drive = [{ model = "zlac8030l", node = 4 }, { model = "m4230e17b50", node = 5 }]
 bitrate = "500k"
 [[host]]

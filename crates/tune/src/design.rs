@@ -24,10 +24,10 @@ const GAIN_MARGIN: f64 = 2.0;
 /// Phase margin where the objective is a bandwidth.
 const PHASE_MARGIN_DEG: f64 = 40.0;
 /// Gains that are tried: so many of each, this far below and above those of the drive.
-const STEPS: i32 = 60;
+const STEPS: i32 = 40;
 const SPAN: f64 = 30.0;
 /// Integral times that are tried, in times of the crossover.
-const INTEGRAL_TIMES: [f64; 11] = [2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 10.0, 20.0];
+const INTEGRAL_TIMES: [f64; 7] = [2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0];
 
 /// What the gains are to reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,11 +140,6 @@ fn lowest_hz(highest_hz: f64) -> f64 {
     highest_hz * 10f64.powf(-DECADES)
 }
 
-/// How far between two frequencies a gain passes through one: its logarithm is nearly straight there.
-fn share_to_one(before: f64, now: f64) -> Option<f64> {
-    ((before - 1.0) * (now - 1.0) < 0.0).then(|| before.ln() / (before / now).ln())
-}
-
 fn margins_of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Margins {
     margins_while(open, highest_hz, |_| true)
 }
@@ -167,7 +162,9 @@ fn margins_while(
         turned += ((1.0 + now) / (1.0 + before)).arg();
         margins.sensitivity = margins.sensitivity.max(1.0 / (1.0 + now).norm());
         let turn = (now / before).arg();
-        if let Some(share) = share_to_one(before.norm(), now.norm()) {
+        if (before.norm() - 1.0) * (now.norm() - 1.0) < 0.0 {
+            // Between the two the logarithm of the gain is nearly straight.
+            let share = before.norm().ln() / (before.norm() / now.norm()).ln();
             margins.crossover_hz = last_hz * (hz / last_hz).powf(share);
             let left = PI + phase + share * turn;
             // Ahead of the current, half a turn is as far away on the other side.
@@ -217,16 +214,18 @@ pub fn propose(
             filter_s,
             ..*around
         };
-        let crossovers = Crossovers::of(open_loop(mechanics, &with(SPAN, 0.0)), highest_hz);
         // The greatest first: nothing below is better that has less integral gain.
         for step in (-STEPS..=STEPS).rev() {
             let proportional = SPAN.powf(f64::from(step) / f64::from(STEPS));
-            let Some(crossover) = crossovers.at(proportional / SPAN) else { continue };
+            let crossover = margins(mechanics, &with(proportional, 0.0), highest_hz).crossover_hz;
             for time in INTEGRAL_TIMES {
                 let candidate = with(proportional, around.proportional * proportional * TAU * crossover / time);
                 let integral = candidate.integral / around.integral;
                 let most = best.as_ref().map_or(f64::NEG_INFINITY, |(worth, _)| *worth);
-                if most >= objective.most_worth(&candidate, around) || !can_hold(proportional, integral) {
+                if crossover == 0.0
+                    || most >= objective.most_worth(&candidate, around)
+                    || !can_hold(proportional, integral)
+                {
                     continue;
                 }
                 let open = open_loop(mechanics, &candidate);
@@ -244,30 +243,6 @@ pub fn propose(
         }
     }
     best.map(|(_, proposal)| proposal)
-}
-
-/// Where the gain of a loop falls to one, whatever factor it is taken by.
-struct Crossovers(Vec<(f64, f64)>);
-
-impl Crossovers {
-    /// Of a loop by the greatest of the factors: there its frequencies are closest.
-    fn of(open: impl Fn(f64) -> Complex<f64>, highest_hz: f64) -> Self {
-        let lowest = lowest_hz(highest_hz);
-        let mut gains = vec![(lowest, open(TAU * lowest).norm())];
-        walk(open, highest_hz, |_, (hz, now)| {
-            gains.push((hz, now.norm()));
-            true
-        });
-        Self(gains)
-    }
-
-    /// The last of them, Hz.
-    fn at(&self, factor: f64) -> Option<f64> {
-        self.0.windows(2).rev().find_map(|pair| {
-            let [(last_hz, before), (hz, now)] = [pair[0], pair[1]];
-            Some(last_hz * (hz / last_hz).powf(share_to_one(before * factor, now * factor)?))
-        })
-    }
 }
 
 /// The gain of a position loop (1/s) around a speed loop, so that this phase is left; and its margins. `late_s` is how late the

@@ -147,7 +147,8 @@ async fn judged(
         true => failure.next("ask for gains that take less, e.g. --phase-margin 50"),
         false => failure,
     })?;
-    report.drive_error = Some([before.step.smooth_error(), after.step.smooth_error()]);
+    let error = judged_by(&before, &after);
+    report.drive_error = Some([error(&before.step), error(&after.step)]);
     if let Some((_, Some(seen))) = &after.moved {
         let what = "with the new gains the shaft was not seen to stand while they held it, and stands without power";
         report.notes.push(format!("{what}: {seen}"));
@@ -202,6 +203,12 @@ fn noted(what_is: &str, Failure { what, because, next, .. }: Failure) -> String 
     [vec![format!("{what_is}, but {what}")], because, next].concat().join("; ")
 }
 
+/// When a drive read its positions decides nothing: where more speed seems wrong, it is looked at without what swings fast. A speed that
+/// does so is one whose current does.
+fn judged_by(before: &Answers, after: &Answers) -> fn(&StepResponse) -> f64 {
+    if after.step.error() > before.step.error() { StepResponse::smooth_error } else { StepResponse::error }
+}
+
 /// Why the new gains do not stay.
 fn objection(before: &Answers, after: &Answers, request: &Request, report: &TuneReport) -> Option<String> {
     let usual_a = SWINGS * request.bounds.current_a;
@@ -215,20 +222,19 @@ fn objection(before: &Answers, after: &Answers, request: &Request, report: &Tune
     let slow_a = MORE_THAN_TWIN * before.slow_ripple_a.max(usual_a);
     // A drive that is to be slower than it was may be off by more.
     let is_slower = report.after.crossover_hz < report.before.crossover_hz;
-    let most_error = |error: fn(&StepResponse) -> f64| match request.objective {
+    let error = judged_by(before, after);
+    let most_error = match request.objective {
         Objective::PhaseMargin(_) if !is_slower => error(&before.step),
         _ => {
             let (twin, size) = (&report.curves.twin[1].step, |of: &StepResponse| of.step_rpm.1 - of.step_rpm.0);
             error(&before.step).max(MORE_THAN_TWIN * error(twin) * size(&after.step) / size(twin))
         }
     };
-    // When a drive read its positions decides nothing; a speed that swings fast is one whose current does.
-    let is_worse = |error: fn(&StepResponse) -> f64| error(&after.step) > most_error(error);
+    let error = error(&after.step);
     let is_off = || {
-        let (error, most_error) = (after.step.smooth_error(), most_error(StepResponse::smooth_error));
         let text =
             || format!("its error after a step is {error:.2} r/min s with the new gains, more than {most_error:.2}");
-        (is_worse(StepResponse::error) && is_worse(StepResponse::smooth_error)).then(text)
+        (error > most_error).then(text)
     };
     swings(after.step.ripple_a(), before.step.ripple_a().max(usual_a).max(of_twin_a), "after a step")
         .or_else(|| swings(after.slow_ripple_a, slow_a, "at a slow speed"))

@@ -132,8 +132,8 @@ fn axes_that_stand_elsewhere_are_refused_with_how_far_and_are_led_there_if_that_
     let refused = bench.plan(&follow).err().unwrap();
     assert_eq!((refused.kind, refused.subject.node.map(NodeId::raw)), ("not_at_start", Some(1)));
     assert_eq!(refused.because, ["node 1 stands at 0 deg and the path begins at 45 deg, 45 deg away"]);
-    assert!(refused.next[0].ends_with("group move 1=45deg 2=0deg"), "{refused}");
-    assert!(refused.next[1].contains("--approach"), "{refused}");
+    assert!(refused.next[1].ends_with("group move 1=45deg 2=0deg"), "{refused}");
+    assert!(refused.next[0].contains("--approach"), "{refused}");
     assert!([1, 2].iter().all(|node| bench.degrees(*node).abs() < 0.1));
     follow.approach = true;
     let planned = bench.plan(&follow).unwrap();
