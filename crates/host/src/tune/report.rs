@@ -163,7 +163,8 @@ pub struct TuneReport {
     pub twin_error: [f64; 2],
     /// A move on the twin by its own ramps, before and after, where the position loop was asked for.
     pub twin_move: Option<[MoveRow; 2]>,
-    /// The same of a step on the drive, once the values were tried there.
+    /// The same of a step on the drive, once the values were tried there. Both without what swings fast at a steady speed, where the error
+    /// was larger after than before: when the drive read its positions decides nothing.
     pub drive_error: Option<[f64; 2]>,
     /// The move on the drive.
     pub drive_move: Option<[MoveRow; 2]>,

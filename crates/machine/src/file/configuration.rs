@@ -10,7 +10,7 @@ use canopen::{Mux, NodeId};
 use cia402::object::{MAX_POSITION_LIMIT, MIN_POSITION_LIMIT, MODES_OF_OPERATION};
 use devices::Description;
 use master::core::PdoMap;
-use master::parameters::is_command;
+use master::parameters::{Left, is_command};
 use master::pdo::{PdoConfig, TransmissionType, record_of, values_off};
 use master::units::parse_duration;
 
@@ -78,15 +78,16 @@ pub(super) fn values(
     all.values
 }
 
-/// A drive would move by it as soon as it has power. The mode alone moves nothing.
+/// What `params` leaves out too: it does something when it is written, or once the drive has power. The mode alone does nothing.
 fn set_point(object: Mux, field: &Field<'_>, model: &Description) -> Option<Problem> {
     let is_mode = model.axes.iter().any(|axis| axis.object(MODES_OF_OPERATION) == object);
-    let moves = !model.axes.is_empty() && is_command(object, Some(model)) && !is_mode;
-    moves.then(|| {
+    let acts = !model.axes.is_empty() && is_command(object, Some(model)) && !is_mode;
+    acts.then(|| {
         let name = model.row(object).map_or("", |row| row.name);
         field.problem(format!(
-            "{object} {name} is a command or a set-point, by which the drive would move when it is enabled; expected settings alone; \
-             ferrodrive move, velocity or a line of a host is what moves it"
+            "{object} {name} is {}: by a command the drive acts at its start, and by a set-point it would move when it is enabled; expected \
+             settings alone; ferrodrive move, velocity, write or a line of a host is for the others",
+            Left::Command
         ))
     })
 }
