@@ -74,7 +74,11 @@ pub(crate) fn watch() -> Result<Seen, Box<dyn Error>> {
     })??;
     say(&world, "# the supply rises to 85 V".to_owned());
     world.apply(place, &"supply 85".parse()?)??;
-    world.run_for(Duration::from_secs(2));
+    let ended = sim::block_on(&mut world, drive.supervise(Duration::from_secs(2)))?;
+    // The command that turns it ends with that; its first line is enough for a picture.
+    let error = ended.err().map(|error| error.to_string()).unwrap_or_default();
+    say(&world, format!("error: {}", error.lines().next().unwrap_or_default()));
+    world.run_for(Duration::from_secs(1));
     say(&world, "$ ferrodrive explain 4".to_owned());
     let explained = sim::block_on(&mut world, drive.explain(&Overheard::default()))?;
     if let Some(cause) = explained.findings.first() {
@@ -234,10 +238,10 @@ fn wrapped(line: &str) -> Vec<String> {
     rows
 }
 
-const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 860 458" width="860" height="458" role="img" font-family="ui-sans-serif, system-ui, 'Segoe UI', Helvetica, Arial, sans-serif">
+const HEAD: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 860 476" width="860" height="476" role="img" font-family="ui-sans-serif, system-ui, 'Segoe UI', Helvetica, Arial, sans-serif">
 <title>A virtual drive boots, is enabled, turns, faults when its supply rises, and is explained</title>
 <style>.name{font-size:12px;fill:#3e4c59}.tick{font-size:11px;fill:#5b6773;text-anchor:end}.line{font-size:13px;font-family:ui-monospace,Menlo,Consolas,monospace}.state{fill:#9aa5b1}.chip{font-size:10.5px;fill:#fff;text-anchor:middle}</style>
-<rect x="0.5" y="0.5" width="859" height="457" rx="8" fill="#ffffff" stroke="#d0d7de"/>
+<rect x="0.5" y="0.5" width="859" height="475" rx="8" fill="#ffffff" stroke="#d0d7de"/>
 <text x="30" y="34" font-size="16" font-weight="600" fill="#1f2933">A ZLAC8030L with its wheel, at node 4 of a virtual bus</text>
 "##;
 

@@ -120,7 +120,7 @@ impl Guard {
         let node = drive.node().id();
         match self.loss {
             HostLoss::StopsInSilence { object, .. } => format!(
-                "this command ends here, and {}: keep this command running with --for TIME; to let the drive go on alone, write 0 to {object} \
+                "this command ends here, and {}: omit --no-wait to keep this command running; to let the drive go on alone, write 0 to {object} \
                  before the motion",
                 self.loss
             ),

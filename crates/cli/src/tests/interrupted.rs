@@ -16,17 +16,18 @@ fn bench() -> VirtualBus {
     VirtualBus::of(&drives.each_ref().map(String::as_str))
 }
 
-/// The commands that move a drive until they are ended: velocity and position on each model; torque where the model has it,
-/// home where it looks for a switch that is not there.
-fn motions(node: &str) -> [Vec<&str>; 3] {
+/// The commands that move a drive until they are ended: velocity, with a time and without one, and position on each model; torque
+/// where the model has it, home where it looks for a switch that is not there.
+fn motions(node: &str) -> [Vec<&str>; 4] {
     let velocity = vec!["velocity", node, "100rpm", "--for", "1h"];
+    let endless = vec!["velocity", node, "100rpm"];
     let position = vec!["move", node, "200turn", "--relative", "--profile-velocity", "100rpm"];
     let last = match node {
-        "4" => vec!["torque", node, "1A", "--for", "1h"],
+        "4" => vec!["torque", node, "1A"],
         "5" => vec!["torque", node, "100mA", "--for", "1h"],
         _ => vec!["home", node, "--method", "17"],
     };
-    [velocity, position, last]
+    [velocity, endless, position, last]
 }
 
 #[test]

@@ -36,9 +36,20 @@ impl VirtualBus {
     /// Drives as `--drive` of `ferrodrive sim` takes them, which have booted; they take no time for what they do.
     #[track_caller]
     pub(super) fn of(drives: &[&str]) -> Self {
+        Self::of_drives(drives, TimingMode::Ideal)
+    }
+
+    /// The same drives, with the times that they take.
+    #[track_caller]
+    pub(super) fn of_real_times(drives: &[&str]) -> Self {
+        Self::of_drives(drives, TimingMode::Device)
+    }
+
+    #[track_caller]
+    fn of_drives(drives: &[&str], timing: TimingMode) -> Self {
         let specs = drives.iter().map(|drive| Placed::from(drive_spec(drive).expect("a drive")));
         let mut machine = Machine::default();
-        (machine.bitrate, machine.drives) = (Some(Bitrate::K500), specs.collect());
+        (machine.bitrate, machine.timing, machine.drives) = (Some(Bitrate::K500), Some(timing), specs.collect());
         Self::of_machine(&machine)
     }
 

@@ -13,7 +13,7 @@ use master::units::{Along, Amperes, Angle, Ramp, Rpm, Shown, parse_duration};
 use serde::Serialize;
 
 use super::drive::{ShaftMotion, StateReport};
-use crate::context::Context;
+use crate::context::{Context, Holding};
 use crate::failure::Failure;
 use crate::guard::{Guard, GuardArgs, GuardReport};
 use plot::Paint;
@@ -21,10 +21,11 @@ use words::models::is_from_file;
 use words::node::node;
 use words::time::some_time;
 
-/// Turn the motor at a speed; without --for it keeps turning after this command
+/// Turn the motor at a speed, until Ctrl-C or for a time
 ///
-/// Enables the drive and returns when the speed is reached; the motor keeps turning. With --for it is stopped
-/// afterwards.
+/// Enables the drive and monitors it while it turns: without --for until Ctrl-C, which stops it. --no-wait returns at
+/// once and leaves the motor turning. On the command's own virtual bus, which ends with it, it returns when the speed is
+/// reached.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive velocity 4 60rpm --for 2s\n  ferrodrive velocity 4 -360deg/s --acceleration 120rpm/s"
@@ -38,7 +39,7 @@ pub struct Velocity {
     speed: Along<Rpm>,
     #[command(flatten)]
     ramps: RampArgs,
-    /// Keep turning for this long, then stop
+    /// Turn for this long, then stop (default: until Ctrl-C)
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "no_wait")]
     duration: Option<Duration>,
 }
@@ -64,10 +65,11 @@ pub struct Move {
     ramps: RampArgs,
 }
 
-/// Apply a motor current (profile torque)
+/// Apply a motor current (profile torque), until Ctrl-C or for a time
 ///
-/// Returns at once: what the motor does depends on the load, its speed too. With --for a quick stop brings it to rest
-/// afterwards: without torque it would coast.
+/// What the motor does depends on the load, its speed too. At the end a quick stop brings it to rest: without torque it
+/// would coast. --no-wait returns at once and leaves the current applied; on the command's own virtual bus so does
+/// a command without --for.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  ferrodrive torque 4 1A --for 500ms")]
 pub struct Torque {
@@ -77,10 +79,10 @@ pub struct Torque {
     /// Motor current: 1.5A, -800mA
     #[arg(allow_hyphen_values = true)]
     current: Amperes,
-    /// Apply it for this long, then quick-stop
+    /// Apply it for this long, then quick-stop (default: until Ctrl-C)
     #[arg(long = "for", value_name = "TIME", value_parser = some_time, conflicts_with = "no_wait")]
     duration: Option<Duration>,
-    /// Accepted for symmetry with the other moving commands: this one never waits
+    /// Return at once and leave the current applied
     #[arg(long)]
     no_wait: bool,
     #[command(flatten)]
@@ -204,7 +206,7 @@ impl Velocity {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: to {}", self.node, self.speed);
         let (motion, guard) = perform(context, &drive, &doing, &self.ramps.guard, &self.motion()).await?;
-        let then = self.duration.map_or(Then::goes_on_if(!stands_at(&self.speed)), Then::StopAfter);
+        let then = Then::of_endless(context, self.duration, self.ramps.no_wait, !stands_at(&self.speed));
         outcome(context, &drive, ("turn at", &self.speed), motion, then, guard).await
     }
 }
@@ -246,7 +248,7 @@ impl Torque {
         let drive = context.known_drive(self.node).await?;
         let doing = format!("node {}: applying {}", self.node, self.current);
         let (motion, guard) = perform(context, &drive, &doing, &self.guard, &self.motion()).await?;
-        let then = self.duration.map_or(Then::goes_on_if(self.current.0 != 0.0), Then::StopAfter);
+        let then = Then::of_endless(context, self.duration, self.no_wait, self.current.0 != 0.0);
         outcome(context, &drive, ("apply", &self.current), motion, then, guard).await
     }
 }
@@ -314,6 +316,8 @@ pub async fn shown_while<T>(context: &Context, drive: &Drive, doing: &str, motio
 pub enum Then {
     /// It is watched for this long, then the drive is stopped.
     StopAfter(Duration),
+    /// It is watched until the command is asked to end; what ends the command stops the drive.
+    UntilAskedToEnd,
     /// The command ends, the motion does not.
     GoesOn,
     /// It is at its end.
@@ -325,7 +329,20 @@ impl Then {
     pub const fn goes_on_if(moving: bool) -> Self {
         if moving { Self::GoesOn } else { Self::Stands }
     }
+
+    /// Of a motion without an end of its own, for which a time was given or none: a motor is left `moving` by a command that
+    /// ends only where that was asked for (`no_wait`), or where something else holds it.
+    fn of_endless(context: &Context, duration: Option<Duration>, no_wait: bool, moving: bool) -> Self {
+        match duration {
+            Some(duration) => Self::StopAfter(duration),
+            None if moving && !no_wait && context.holding == Holding::Unheld => Self::UntilAskedToEnd,
+            None => Self::goes_on_if(moving),
+        }
+    }
 }
+
+/// Longer than any command runs; as long as a time may be that is typed.
+const YEAR: Duration = Duration::from_secs(365 * 24 * 3600);
 
 /// Reads what came of a motion, and ends it if it is to be ended. `verb` and `value` say what was asked for.
 pub async fn outcome(
@@ -343,8 +360,19 @@ pub async fn outcome(
     };
     let limits = limits(drive).await;
     let mut before_stop = None;
-    if let Then::StopAfter(duration) = then {
-        let doing = format!("node {}: {done} for {} s", drive.node().id(), duration.as_secs_f64());
+    let node = drive.node().id();
+    let watched = match then {
+        Then::StopAfter(duration) => Some((duration, format!("node {node}: {done} for {} s", duration.as_secs_f64()))),
+        Then::UntilAskedToEnd => {
+            let (reached, limits) = (reached_text(motion.reached_after), limits.text());
+            context.note(&format!(
+                "node {node}: {done}: {reached}; limits: {limits}; until Ctrl-C stops it (or give --for TIME; --no-wait leaves it so)"
+            ));
+            Some((YEAR, format!("node {node}: {done}")))
+        }
+        Then::GoesOn | Then::Stands => None,
+    };
+    if let Some((duration, doing)) = watched {
         context.show(&doing);
         shown_while(context, drive, &doing, drive.supervise(duration)).await?;
         before_stop = Some(StateReport::read(drive).await?.motion);
@@ -448,13 +476,15 @@ impl ProfileLimits {
     }
 }
 
+fn reached_text(after: Option<Duration>) -> String {
+    after.map_or("commanded, not waited for".into(), |time| format!("reached after {:.2} s", time.as_secs_f64()))
+}
+
 impl MotionOutcome {
     /// As lines for people.
     pub fn text(&self, paint: Paint) -> String {
-        let reached = match self.reached_after_s {
-            Some(seconds) => paint.good(&format!("reached after {seconds:.2} s")),
-            None => "commanded, not waited for".into(),
-        };
+        let reached = reached_text(self.reached_after_s.map(Duration::from_secs_f64));
+        let reached = if self.reached { paint.good(&reached) } else { reached };
         let then = if self.stopped { "; stopped again" } else { "" };
         let mut lines = vec![format!("node {}: {}: {reached}{then}", self.state.node, self.done)];
         let rounded = self.commanded.iter().filter(|sent| sent.rounded);
