@@ -107,7 +107,7 @@ export function figureRows({ runs }) {
 }
 
 /** What was done, within which limits, and that the drive is as it was. */
-export function remarkOf({ shape, runs, limits, lacks, nmt_back }) {
+export function remarkOf({ runs, limits, lacks, nmt_back }) {
   const { velocity_rpm, acceleration_rpm_s, following_error_deg, travel_turns } = limits;
   const within = [
     `${number(velocity_rpm, 0)} r/min`,
@@ -115,9 +115,7 @@ export function remarkOf({ shape, runs, limits, lacks, nmt_back }) {
     following_error_deg === null ? null : `${number(following_error_deg, 0)}° of following error`,
     travel_turns === null ? null : `${travel_turns} turns of travel`,
   ];
-  // As after a motion of a group: it has its own RPDO and TPDO, which stay.
-  const pdos = shape === "steps" ? "its PDOs are as they were" : "its spare TPDOs are as they were; the PDOs of its set-points stay mapped";
-  const back = lacks.length ? lacks.join("; ") : `The drive stands without power, and ${pdos}${nmt_back ? `; ${nmt_back}` : ""}.`;
+  const back = lacks.length ? lacks.join("; ") : `The drive stands without power, and its PDOs are as they were${nmt_back ? `; ${nmt_back}` : ""}.`;
   return `${count(runs.length, "run")} within ${within.filter(Boolean).join(", ")}. ${back}`;
 }
 

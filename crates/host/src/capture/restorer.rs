@@ -56,6 +56,8 @@ struct WrittenObjects {
     journal: Option<Kept>,
     /// Of PDOs whose mapping is among them, those that this program received or sent.
     used: Arc<[PdoId]>,
+    /// PDOs that a group or a base had taken for its cycles: what it puts back, when it ends, is what they had before either.
+    of_group: Arc<[PdoId]>,
 }
 
 impl Restorer {
@@ -104,11 +106,13 @@ impl Restorer {
 
     /// Objects are going to be written, and these writes lead back.
     pub(crate) fn note_written(&self, undo: Vec<(Mux, Vec<u8>)>, journal: Option<Kept>) {
-        let mappings =
-            undo.iter().filter_map(|(mux, _)| PdoId::of_object(mux.index).filter(|(_, is_mapping)| *is_mapping));
-        let mut used: Vec<_> = mappings.map(|(pdo, _)| pdo).filter(|pdo| self.node().uses_pdo(*pdo)).collect();
+        let pdos = undo.iter().filter_map(|(mux, _)| PdoId::of_object(mux.index)).collect::<Vec<_>>();
+        let mapped = pdos.iter().filter(|(_, is_mapping)| *is_mapping).map(|(pdo, _)| *pdo);
+        let mut used: Vec<_> = mapped.filter(|pdo| self.node().uses_pdo(*pdo)).collect();
         used.dedup();
-        self.lock().written.push(WrittenObjects { undo: undo.into(), journal, used: used.into() });
+        let pdos = pdos.into_iter().map(|(pdo, _)| pdo);
+        let of_group = pdos.filter(|pdo| self.node().is_to_put_back(*pdo)).collect();
+        self.lock().written.push(WrittenObjects { undo: undo.into(), journal, used: used.into(), of_group });
     }
 
     /// What was written last stays.
@@ -133,15 +137,23 @@ impl Restorer {
     /// Puts back what was written as the one with this index, and whether its journal could be deleted.
     async fn put_back(&self, at: usize) -> (Undone, Result<(), Failure>) {
         // It stays noted until it is done: this may be given up on the way.
-        let found = self.lock().written.get(at).map(|written| (Arc::clone(&written.undo), Arc::clone(&written.used)));
-        let Some((undo, used)) = found else {
+        let found = self
+            .lock()
+            .written
+            .get(at)
+            .map(|written| (Arc::clone(&written.undo), Arc::clone(&written.used), Arc::clone(&written.of_group)));
+        let Some((undo, used, of_group)) = found else {
             return (Undone::default(), Ok(()));
         };
-        let undone = roll_back(self.node(), &undo, |_| None).await;
+        // Of a group that has ended meanwhile.
+        let is_back = |pdo: &PdoId| of_group.contains(pdo) && !self.node().is_to_put_back(*pdo);
+        let is_left = |(mux, _): &&(Mux, Vec<u8>)| PdoId::of_object(mux.index).is_none_or(|(pdo, _)| !is_back(&pdo));
+        let writes: Vec<_> = undo.iter().filter(is_left).cloned().collect();
+        let undone = roll_back(self.node(), &writes, |_| None).await;
         if !undone.not_put_back.is_empty() {
             return (undone, Ok(()));
         }
-        used.iter().for_each(|pdo| self.node().resume_pdo(*pdo));
+        used.iter().filter(|pdo| !is_back(pdo)).for_each(|pdo| self.node().resume_pdo(*pdo));
         // A clone may have done the same meanwhile.
         let done = self.lock().written.extract_if(.., |written| Arc::ptr_eq(&written.undo, &undo)).next();
         (undone, done.and_then(|done| done.journal).map_or(Ok(()), Kept::remove))
@@ -188,7 +200,7 @@ impl Restorer {
         }
         let stood = bring_to_rest(&self.drive).await;
         let released = match motion.was_guarded {
-            true => Ok(()),
+            true => network.put_back([id].into_iter().collect()).await,
             // One that was not seen to stand is left to its own watch: it is among those in motion.
             false => network.release_guards([id].into_iter().collect()).await,
         };

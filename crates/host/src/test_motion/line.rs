@@ -89,8 +89,8 @@ impl TestMotionLine {
         self.order.motion(CyclicOptions::default())
     }
 
-    /// Moves a virtual drive, captures each run, and puts back what the captures have changed: the drive is without power then. Points
-    /// leave the PDOs of their set-points mapped, as a group does.
+    /// Moves a virtual drive, captures each run, and puts back what the captures and the motion have changed: the drive is without power
+    /// then.
     ///
     /// # Errors
     /// What stopped it, and what could not be put back.

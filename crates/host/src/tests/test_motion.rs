@@ -64,19 +64,19 @@ fn figure(step: &Value, name: &str) -> f64 {
 }
 
 impl Stage {
-    /// SYNC has ended, the shaft was seen to stand without power, and what is captured is not sent any more. Points are sent by a group, whose
-    /// RPDO and TPDO stay mapped and its node operational; steps leave nothing.
+    /// SYNC has ended, the shaft was seen to stand without power, and the TPDOs are as they were. Points are sent by a group, which
+    /// leaves its node operational; steps leave nothing.
     async fn is_as_it_was(&self, shape: ShapeName, before: (u32, u32)) {
         for _ in 0..300 {
             let has_ended = self.network.with_core(|core| core.sync_period()).is_none();
-            let is_mapped = self.cell(SECOND_COUNT).await != 0;
+            let is_mapped = self.cell(SECOND_COUNT).await != 0 || self.tpdo().await != before;
             if has_ended && !is_mapped && !self.network.moved().contains(WHEEL) {
                 break;
             }
             self.sleep(10).await;
         }
         assert_eq!(self.network.with_core(|core| core.sync_period()), None, "SYNC ends");
-        assert_eq!(self.cell(SECOND_COUNT).await, 0, "the spare TPDO is empty");
+        assert_eq!((self.cell(SECOND_COUNT).await, self.tpdo().await), (0, before), "the spare TPDO is empty");
         assert!(!self.network.moved().contains(WHEEL), "it was seen to stand");
         assert_ne!(self.power_state(WHEEL).await, cia402::PowerState::OperationEnabled);
         if shape == ShapeName::Steps {

@@ -477,7 +477,7 @@ impl WheelSetup {
         if !self.turns.is_finite() || self.turns == 0.0 {
             return Err(BaseError::BadLimit { what: "turns of the drive for a turn of the wheel", value: self.turns });
         }
-        self.drive.configure_cyclic_with_position(self.mode).await?;
+        self.drive.configure_cyclic_for_a_motion(self.mode).await?;
         let mut drive = self.drive.cyclic(self.mode, options).await?;
         drive.stands_after(REST_TIME);
         let rpm_of = |m: f64| m * geometry.turns_per_m() * self.turns.abs() * 60.0;

@@ -227,7 +227,7 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn configure_cyclic(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
-        self.configure_cyclic_with(mode, false).await
+        self.configure_cyclic_with(mode, false, false).await
     }
 
     /// As [`configure_cyclic`](Self::configure_cyclic), and in every mode the TPDO shows the position: for a program that
@@ -236,21 +236,40 @@ impl Drive {
     /// # Errors
     /// [`CyclicError`].
     pub async fn configure_cyclic_with_position(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
-        self.configure_cyclic_with(mode, true).await
+        self.configure_cyclic_with(mode, true, false).await
     }
 
-    async fn configure_cyclic_with(&self, mode: ModeOfOperation, position: bool) -> Result<(), CyclicError> {
-        let description = self.known(INTENT)?;
-        let node = self.node().id();
+    /// The same for a motion alone: the PDOs are put back as they were when the drive stands and its guard is given back
+    /// ([`Network::release_guards`](crate::Network::release_guards)).
+    pub(crate) async fn configure_cyclic_for_a_motion(&self, mode: ModeOfOperation) -> Result<(), CyclicError> {
+        self.configure_cyclic_with(mode, true, true).await
+    }
+
+    async fn configure_cyclic_with(
+        &self,
+        mode: ModeOfOperation,
+        position: bool,
+        former: bool,
+    ) -> Result<(), CyclicError> {
+        let (description, node) = (self.known(INTENT)?, self.node());
         let Some(mapped) = self.pdos_of_cycle(mode, position)? else { return Ok(()) };
-        for config in mapped {
-            self.node().configure_pdo(&config, TimerUnits::of(description)).await?;
-        }
-        for config in self.adopt_pdos(description).await?.tpdos {
-            let number = config.pdo.number;
-            let known = self.node().network().look(|core| core.image().tpdo_id(node, number).is_some());
-            if known && number.position() >= description.axes.len() && !config.map.0.is_empty() {
-                self.node().switch_pdo_off(config.pdo).await?;
+        let units = TimerUnits::of(description);
+        for pdo in pdos_of(description) {
+            let (config, cob_id) = node.pdo_config(pdo, units).await?;
+            let own = mapped.iter().find(|own| own.pdo == pdo);
+            let others = pdo.direction == Direction::Tpdo && pdo.number.position() >= description.axes.len();
+            let is_off = !others || !cob_id.is_valid() || config.map.0.is_empty();
+            if own.is_none() && is_off {
+                continue;
+            }
+            if former {
+                // What is mapped meanwhile has no objects of less than a byte.
+                let objects = description.pdo.max_objects.min(can::MAX_DATA_LENGTH as u8);
+                node.note_former_pdo((config, cob_id), objects, units).await?;
+            }
+            match own {
+                Some(own) => node.configure_pdo(own, units).await?,
+                None => node.switch_pdo_off(pdo).await?,
             }
         }
         Ok(())
@@ -312,11 +331,7 @@ impl Drive {
     async fn adopt_pdos(&self, description: &Description) -> Result<Mapped, Error> {
         let units = TimerUnits::of(description);
         let mut mapped = Mapped { rpdos: Vec::new(), tpdos: Vec::new() };
-        let parameters = description.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
-        for (pdo, is_mapping) in parameters.filter_map(|mux| PdoId::of_object(mux.index)) {
-            if is_mapping {
-                continue;
-            }
+        for pdo in pdos_of(description) {
             let config = self.node().adopt_pdo(pdo, units).await?;
             match pdo.direction {
                 Direction::Rpdo => mapped.rpdos.push(config),
@@ -453,6 +468,14 @@ impl Drive {
         // Mapped with another length it is something else.
         Ok(signal.filter(|signal| signal.field().bits as usize == data_type.size() * 8))
     }
+}
+
+/// Every PDO that a model has.
+fn pdos_of(description: &Description) -> impl Iterator<Item = PdoId> {
+    let parameters = description.dictionary.rows().iter().map(|row| row.mux()).filter(|mux| mux.sub_index == 1);
+    parameters
+        .filter_map(|mux| PdoId::of_object(mux.index))
+        .filter_map(|(pdo, is_mapping)| (!is_mapping).then_some(pdo))
 }
 
 /// How often a TPDO is sent without a request, if it does. With `answers` it is sent for each RPDO of its number.

@@ -18,7 +18,7 @@ use crate::error::Error;
 use crate::gear::Gear;
 use crate::host_loss::{ArmedGuard, HostLoss};
 use crate::identify;
-use crate::network::{Network, Node, join_all};
+use crate::network::{Former, Network, Node, join_all};
 
 /// How often a drive that watches for silence or for a heartbeat is content within its time: two may get lost.
 const SIGNS_IN_TIME: u32 = 4;
@@ -209,7 +209,7 @@ impl Network {
 
     /// Ends the guards of those of these drives that this program has not set in motion, or has seen to stand since, as
     /// [`Drive::release_guard`] does. A drive that may still be moving keeps its watch over its host, and is no longer kept
-    /// content: it stops by itself. The others have their ramps back, where a group or a base had set them for its cycles.
+    /// content: it stops by itself. The others have back what a group or a base had [changed](Self::put_back) for its cycles.
     ///
     /// # Errors
     /// The first error of an SDO request; those guards have ended nevertheless.
@@ -222,25 +222,30 @@ impl Network {
         }
         let at_rest = nodes.iter().filter(|node| !moved.contains(*node));
         let released = join_all(at_rest.map(|node| self.release_guard(node, moved)).collect::<Vec<_>>()).await;
-        let put_back = NodeId::all().filter(|node| of.contains(*node) && !moved.contains(*node));
-        let put_back = join_all(put_back.map(|node| self.put_back(node)).collect::<Vec<_>>()).await;
-        released.into_iter().chain(put_back).collect()
+        let put_back = self.put_back(of).await;
+        released.into_iter().chain([put_back]).collect()
     }
 
-    /// Writes what was noted of a node's objects.
-    async fn put_back(&self, id: NodeId) -> Result<(), Error> {
+    /// Puts back what a group or a base has changed for its cycles (ramps, interpolation time, PDOs), of those of these drives that this
+    /// program has not set in motion, or has seen to stand since. Their guards stay.
+    ///
+    /// # Errors
+    /// The first error of an SDO request; what it left is tried again at the next release.
+    pub async fn put_back(&self, of: NodeSet) -> Result<(), Error> {
+        let moved = self.moved();
+        let at_rest = NodeId::all().filter(|node| of.contains(*node) && !moved.contains(*node));
+        let put_back = at_rest.map(|node| self.put_back_node(node));
+        join_all(put_back.collect::<Vec<_>>()).await.into_iter().collect()
+    }
+
+    async fn put_back_node(&self, id: NodeId) -> Result<(), Error> {
         let node = self.node(id).by_server_in_use();
-        let mut former = self.take_former(id).into_iter();
-        while let Some((object, value)) = former.next() {
-            if let Err(error) = node.download(object, value.as_bytes()).await {
-                // The next release tries them again.
-                std::iter::once((object, value))
-                    .chain(former)
-                    .for_each(|(object, value)| self.note_former(id, object, value));
-                return Err(error);
-            }
-        }
-        Ok(())
+        let mut left = self.take_former(id);
+        let done = put_back(&node, &mut left).await;
+        // The next release tries the rest again.
+        left.objects.into_iter().for_each(|(object, value)| self.note_former(id, object, value));
+        left.pdos.into_values().for_each(|pdo| self.note_former_pdo(id, pdo));
+        done
     }
 
     /// Stops, on all nodes but `own`, what the first heartbeat of `host` would set going again: a drive that has stopped for want of it
@@ -386,6 +391,19 @@ impl Network {
         self.heartbeat_within(host, period, allowed);
         period.is_some()
     }
+}
+
+/// Takes out of `left` what it has put back.
+async fn put_back(node: &Node, left: &mut Former) -> Result<(), Error> {
+    while let Some(object) = left.objects.first_entry() {
+        node.download(*object.key(), object.get().as_bytes()).await?;
+        object.remove();
+    }
+    while let Some(pdo) = left.pdos.first_entry() {
+        node.put_back_pdo(pdo.get()).await?;
+        pdo.remove();
+    }
+    Ok(())
 }
 
 /// Has a consumer of the heartbeat of `host` wait for a first one again, with `value` in its entry, or what was there. A

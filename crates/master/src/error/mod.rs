@@ -220,6 +220,18 @@ pub enum Error {
         /// How long was waited.
         waited: Duration,
     },
+    /// An object that was changed for a motion alone was written back, and has another value.
+    #[error("{mux} of node {node} was put back to {had:X}h after the motion and reads {found:X}h: write it again")]
+    NotPutBack {
+        /// The node.
+        node: NodeId,
+        /// The object.
+        mux: Mux,
+        /// What it had before, and was written.
+        had: u32,
+        /// What it reads.
+        found: u32,
+    },
     /// The model has no command that restores factory settings.
     #[error("node {node}: the {model} cannot restore its factory settings: write each object instead")]
     NoFactorySettings {
@@ -308,6 +320,7 @@ impl Error {
             Self::NoSuchMode { .. } => "no_such_mode",
             Self::OutOfLimits { .. } => "out_of_limits",
             Self::TooFine { .. } => "too_fine",
+            Self::NotPutBack { .. } => "not_put_back",
         }
     }
 
@@ -334,7 +347,8 @@ impl Error {
             | Self::NoFactorySettings { node, .. }
             | Self::NoSuchMode { node, .. }
             | Self::OutOfLimits { node, .. }
-            | Self::TooFine { node, .. } => *node,
+            | Self::TooFine { node, .. }
+            | Self::NotPutBack { node, .. } => *node,
             Self::NotReached(explanation) => explanation.node,
         }
     }

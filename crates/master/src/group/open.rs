@@ -89,7 +89,7 @@ impl AxisSetup {
 
     async fn open(&self, axis: usize, period: Duration, options: CyclicOptions) -> Result<CyclicDrive, GroupError> {
         let (node, mode) = (self.drive.node().id(), self.mode);
-        self.drive.configure_cyclic_with_position(mode).await?;
+        self.drive.configure_cyclic_for_a_motion(mode).await?;
         self.set_interpolation_time(period).await?;
         let drive = self.drive.cyclic(mode, options).await?;
         let stated_rpm = self.limits.velocity_turns_s * 60.0;
@@ -108,7 +108,7 @@ impl AxisSetup {
         }
     }
 
-    /// How far apart the set-points come, for drives that interpolate between them.
+    /// How far apart the set-points come, for drives that interpolate between them. What they had is put back with the ramps.
     async fn set_interpolation_time(&self, period: Duration) -> Result<(), GroupError> {
         let Some(description) = self.drive.description() else { return Ok(()) };
         let [units, exponent] = INTERPOLATION_TIME.map(|mux| self.drive.place(mux));
@@ -119,8 +119,12 @@ impl AxisSetup {
         let micros = period.as_micros();
         let (value, power) = if micros.is_multiple_of(1000) { (micros / 1000, -3_i8) } else { (micros / 100, -4) };
         let value = u8::try_from(value).map_err(|_| GroupError::Period { given: period })?;
-        self.drive.node().write(units, value).await?;
-        self.drive.node().write(exponent, power).await?;
+        let node = self.drive.node();
+        for object in [units, exponent] {
+            node.network().note_former(node.id(), object, node.upload(object).await?);
+        }
+        node.write(units, value).await?;
+        node.write(exponent, power).await?;
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use can::{Frame, Instant, Station};
 use canopen::nmt::NmtTarget;
+use canopen::pdo::PdoId;
 use canopen::{Mux, NmtCommand, NodeId, sync};
 use devices::AxisId;
 
@@ -12,6 +13,7 @@ use super::moved::{Moved, MovedAxis};
 use crate::core::{Command, Core, Event, NodeFacts, NodeSet, Outcome, Payload, Received, SdoServer, Ticket};
 use crate::host_loss::ArmedGuard;
 use crate::models::Models;
+use crate::pdo::FormerPdo;
 
 /// A CANopen network as its master sees it: a cheap handle that all tasks and the runner share.
 ///
@@ -19,6 +21,13 @@ use crate::models::Models;
 #[derive(Clone, Debug, Default)]
 pub struct Network {
     shared: Arc<Mutex<NetworkState>>,
+}
+
+/// What a node had of what was changed for a motion alone.
+#[derive(Debug, Default)]
+pub(crate) struct Former {
+    pub objects: BTreeMap<Mux, Payload>,
+    pub pdos: BTreeMap<PdoId, FormerPdo>,
 }
 
 #[derive(Debug, Default)]
@@ -45,7 +54,7 @@ pub(super) struct NetworkState {
     /// What watches this program, by node.
     guards: BTreeMap<NodeId, ArmedGuard>,
     /// What objects had that are changed for a motion alone.
-    former: BTreeMap<NodeId, BTreeMap<Mux, Payload>>,
+    former: BTreeMap<NodeId, Former>,
     /// SDO servers that nodes are to be asked by, whose records are still to be read.
     chosen_servers: BTreeMap<NodeId, u16>,
     /// How often another server was chosen for a node: what was read for an earlier choice overrules no later one.
@@ -282,11 +291,21 @@ impl Network {
     /// An object of a node is going to be changed for a motion alone; what it has now is put back when the node's guard is given back. Of
     /// an object that has been noted the first value counts.
     pub(crate) fn note_former(&self, node: NodeId, object: Mux, value: Payload) {
-        self.lock().former.entry(node).or_default().entry(object).or_insert(value);
+        self.lock().former.entry(node).or_default().objects.entry(object).or_insert(value);
     }
 
-    /// Takes what was noted of a node's objects.
-    pub(crate) fn take_former(&self, node: NodeId) -> BTreeMap<Mux, Payload> {
+    /// The same of a PDO, which is set up in an order of its own.
+    pub(crate) fn note_former_pdo(&self, node: NodeId, pdo: FormerPdo) {
+        self.lock().former.entry(node).or_default().pdos.entry(pdo.config.pdo).or_insert(pdo);
+    }
+
+    /// Whether a PDO was noted, and not put back since.
+    pub(crate) fn has_former_pdo(&self, node: NodeId, pdo: PdoId) -> bool {
+        self.lock().former.get(&node).is_some_and(|former| former.pdos.contains_key(&pdo))
+    }
+
+    /// Takes what was noted of a node's objects and PDOs.
+    pub(crate) fn take_former(&self, node: NodeId) -> Former {
         self.lock().former.remove(&node).unwrap_or_default()
     }
 

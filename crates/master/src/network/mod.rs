@@ -18,6 +18,7 @@ pub(crate) use claim::Claim;
 pub use cycle::{Exchange, NextSync, NoCycle};
 pub use frame_log::FrameLog;
 pub use future::{Elapsed, NodeView, Sleep, Wait};
+pub(crate) use handle::Former;
 pub use handle::Network;
 pub use join::join_all;
 pub(crate) use moved::MovedAxis;

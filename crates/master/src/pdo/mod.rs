@@ -16,6 +16,7 @@ mod transaction;
 mod values;
 mod when;
 
+pub(crate) use config::FormerPdo;
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
 pub use error::{PdoError, SignalError};
 pub use silence::{Silence, Situation, why_silent};

@@ -2,9 +2,9 @@
 
 use canopen::{AbortCode, CobId, Mux};
 
-use super::config::{PdoConfig, TimerUnits};
+use super::config::{FormerPdo, PdoConfig, TimerUnits};
 use super::error::PdoError;
-use super::transaction::{apply, read};
+use super::transaction::{apply, put_back, read};
 use crate::core::RpdoTrigger;
 use crate::error::Error;
 use crate::network::Node;
@@ -12,6 +12,54 @@ use can::{CanId, Frame};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 
 impl Node {
+    /// Has a PDO put back when the guard of the drive is given back, since it is going to be set up for a motion alone, with so many objects
+    /// at most. An entry that a device does not have is left out.
+    ///
+    /// # Errors
+    /// Those of the SDO reads.
+    pub(crate) async fn note_former_pdo(
+        &self,
+        (config, cob_id): (PdoConfig, CobId),
+        objects: u8,
+        units: TimerUnits,
+    ) -> Result<(), Error> {
+        let mut behind = Vec::new();
+        for sub_index in config.map.0.len() as u8 + 1..=objects {
+            match self.upload(config.mapping(sub_index)).await {
+                Ok(record) => behind.push(record.raw()),
+                Err(Error::Aborted { .. }) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        let was_used = self.uses_pdo(config.pdo);
+        self.network().note_former_pdo(self.id(), FormerPdo { config, cob_id, units, behind, was_used });
+        Ok(())
+    }
+
+    /// Whether a group or a base has set it up for its cycles, and will put it back ([`Network::put_back`](crate::Network::put_back)).
+    pub fn is_to_put_back(&self, pdo: PdoId) -> bool {
+        self.network().has_former_pdo(self.id(), pdo)
+    }
+
+    /// Puts it back.
+    pub(crate) async fn put_back_pdo(&self, former: &FormerPdo) -> Result<(), Error> {
+        let FormerPdo { config, cob_id, was_used, .. } = former;
+        // Not by the mapping of the motion any more, whatever becomes of it.
+        self.forget_pdo(config.pdo);
+        put_back(self, former).await?;
+        if *was_used {
+            self.use_pdo(config, *cob_id);
+        }
+        Ok(())
+    }
+
+    fn forget_pdo(&self, pdo: PdoId) {
+        self.network().with_core(|core| match pdo.direction {
+            Direction::Tpdo => core.image_mut().remove_tpdo(self.id(), pdo.number),
+            Direction::Rpdo => core.image_mut().remove_rpdo(self.id(), pdo.number),
+        });
+    }
+
     /// Sets up a PDO of the device and, when every value reads back right, sends or receives it by its mapping.
     ///
     /// # Errors
@@ -52,10 +100,7 @@ impl Node {
             Err(Error::Aborted { code: AbortCode::READ_ONLY, .. }) => return Ok(()),
             other => other?,
         }
-        self.network().with_core(|core| match pdo.direction {
-            Direction::Tpdo => core.image_mut().remove_tpdo(self.id(), pdo.number),
-            Direction::Rpdo => core.image_mut().remove_rpdo(self.id(), pdo.number),
-        });
+        self.forget_pdo(pdo);
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use canopen::{AbortCode, CobId, Mux};
 
-use super::config::{PdoConfig, TimerUnits, TransmissionType};
+use super::config::{FormerPdo, PdoConfig, TimerUnits, TransmissionType};
 use super::error::PdoError;
 use crate::core::PdoMap;
 use crate::error::Error;
@@ -58,6 +58,25 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
             })
         }
     }
+}
+
+/// Sets a PDO up as it was [read](read), switched off if it was.
+pub(super) async fn put_back(node: &Node, former: &FormerPdo) -> Result<(), Error> {
+    let FormerPdo { config, cob_id, units, behind, .. } = former;
+    // What a device has is no longer than a PDO.
+    let Ok(mut writes) = plan(node, config, *units) else { return Ok(()) };
+    let mapped = config.map.0.len() + 1;
+    let behind = (mapped..).zip(behind).map(|(sub_index, raw)| {
+        let mux = config.mapping(sub_index as u8);
+        NamedWrite { step: "put back an entry behind the last object", mux, raw: *raw, bytes: 4 }
+    });
+    writes.splice(mapped..mapped, behind.collect::<Vec<_>>());
+    restore(node, config, &Before { cob_id: *cob_id, writes }).await.map_err(|trouble| match trouble {
+        WriteTrouble::Failed(_, cause) => cause,
+        WriteTrouble::Differs(NamedWrite { mux, raw: had, .. }, found) => {
+            Error::NotPutBack { node: node.id(), mux, had, found }
+        }
+    })
 }
 
 /// Reads how a PDO is set up.

@@ -1,21 +1,26 @@
 //! Groups of axes in virtual time: the standard's servo by cyclic synchronous positions, the joint by interpolated ones, and a
 //! hub motor by speeds. What is true is asked of the simulated shafts, not of the drives.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::support::node;
 use can::{Bitrate, Instant};
 use canopen::Mux;
+use canopen::pdo::{Direction, MappingRecord, PdoId, PdoNumber};
 use cia402::ModeOfOperation;
+use cia402::object::MODES_OF_OPERATION_DISPLAY;
 use devices::Description;
 use devices::servo::CIA402;
+use master::core::PdoMap;
 use master::cyclic::{CyclicOptions, Refusal};
 use master::drive::HomingOptions;
 use master::group::{
     AxisHoming, AxisLimits, AxisSetup, Group, GroupError, HomingOrder, PathError, Phase, StopCause, StreamOptions, home,
 };
+use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
 use master::units::Turns;
-use master::{Drive, Gear, Network};
+use master::{Drive, Gear, Network, Node};
 use sim::machine::{Order, order};
 use sim::{Place, Stimulus, SwitchRange, World, block_on};
 
@@ -414,6 +419,61 @@ fn a_group_that_is_given_up_leaves_the_ramps_of_its_drives_as_they_were() {
     drop(group);
     block_on(&mut bench.world, bench.network.stop_and_release()).unwrap();
     assert_eq!(block_on(&mut bench.world, ramps()).unwrap(), before);
+}
+
+/// CiA 301, 7.5.2.35 to 7.5.2.38: every value of every PDO, as far as the device has it.
+async fn pdo_values(node: &Node) -> BTreeMap<Mux, u32> {
+    let mut values = BTreeMap::new();
+    for first in [0x1400, 0x1600, 0x1800, 0x1A00] {
+        for (index, sub_index) in (first..first + 8).flat_map(|index| (0..=8).map(move |sub_index| (index, sub_index)))
+        {
+            if let Ok(payload) = node.upload(Mux::new(index, sub_index)).await {
+                values.insert(Mux::new(index, sub_index), payload.raw());
+            }
+        }
+    }
+    values
+}
+
+/// However it ends, and whatever its drives had (the mapping of a joint is fixed, and no group changes it): here the first TPDO is as delivered, the second is another one that is read meanwhile, and
+/// the last is off.
+#[test]
+fn what_a_group_maps_for_its_cycles_is_put_back_at_its_end() {
+    for model in ["zlac8030l", "zlim42c", "cia402"].map(|name| devices::model(name).unwrap()) {
+        for is_closed in [true, false] {
+            let said = format!("{} {is_closed}", model.name);
+            let mut bench = Bench::new(&[(model, ModeOfOperation::default())]);
+            bench.setups[0].mode = AxisSetup::best_mode(&bench.setups[0].drive).unwrap();
+            let node = bench.network.node(node(1));
+            let pdo = |number| PdoId { direction: Direction::Tpdo, number: PdoNumber::at(number).unwrap() };
+            let record = MappingRecord { mux: MODES_OF_OPERATION_DISPLAY, bits: 8 };
+            let own = PdoConfig::new(pdo(1), PdoMap(vec![record])).transmission(TransmissionType::EVERY_SYNC);
+            let units = TimerUnits::of(model);
+            block_on(&mut bench.world, node.configure_pdo(&own, units)).unwrap().unwrap();
+            block_on(&mut bench.world, node.switch_pdo_off(pdo(2))).unwrap().unwrap();
+            let before = block_on(&mut bench.world, pdo_values(&node)).unwrap();
+            let mut group = bench.open();
+            group.start_move(&turns(&[0.5]), None).unwrap();
+            for _ in 0..100 {
+                bench.cycle(&mut group);
+            }
+            let meanwhile = block_on(&mut bench.world, group.beside(pdo_values(&node))).unwrap();
+            assert_ne!(meanwhile, before, "{said}");
+            if is_closed {
+                block_on(&mut bench.world, group.close()).unwrap().unwrap();
+            } else {
+                drop(group);
+                block_on(&mut bench.world, bench.network.stop_and_release()).unwrap();
+            }
+            assert_eq!(block_on(&mut bench.world, pdo_values(&node)).unwrap(), before, "{said}");
+            // What this program read before, it reads again.
+            assert_eq!([0, 1, 2].map(|at| node.uses_pdo(pdo(at))), [false, true, false], "{said}");
+            bench.network.sync(Some(10 * MS));
+            block_on(&mut bench.world, bench.network.sleep(50 * MS)).unwrap();
+            let mode = node.signal::<i8>(MODES_OF_OPERATION_DISPLAY).unwrap();
+            assert!(bench.network.exchange(|io| io.read(mode)).is_some(), "{said}");
+        }
+    }
 }
 
 #[test]

@@ -367,8 +367,8 @@ class Drive(_Orders):
         sdo: bool = False,
         journal: Optional[Union[str, "os.PathLike[str]"]] = None,
     ) -> list[TestMotionRun]:
-        """Moves it by a test motion, ``count`` times, each captured, with figures. The drive is without power afterwards. Steps leave
-        its PDOs as they were; of points those that carry them stay mapped, as of a group. What ``ferrodrive test-motion`` does.
+        """Moves it by a test motion, ``count`` times, each captured, with figures. Afterwards the drive is without power, and its PDOs
+        are as they were. What ``ferrodrive test-motion`` does.
 
         :param shape: ``back-and-forth``, ``ramp``, ``sine``, ``chirp``, ``prbs``, ``path``, point by point within the limits; or ``steps`` of
             velocity by the drive's own ramps

@@ -32,8 +32,7 @@ use plot::{Paint, Table};
 ///
 /// SHAPE is back-and-forth, ramp, sine, chirp, prbs or path, sent point by point within the limits that are stated, or
 /// steps of velocity by the drive's own ramps. What is captured meanwhile gives rise, overshoot, settling and r.m.s.
-/// current, as far as the sampling shows them. The drive is without power afterwards. Steps leave its PDOs as they were;
-/// of points those that carry them stay mapped, as of a group: `params backup` before, `params apply` to go back.
+/// current, as far as the sampling shows them. Afterwards the drive is without power, and its PDOs are as they were.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive test-motion 4 steps --speed 60rpm --count 3 -o step.mcap\n  \
     ferrodrive test-motion 4 sine --by 10deg --frequency 2 --velocity 90rpm")]
