@@ -434,6 +434,21 @@ pub async fn hold(group: &mut Group, mut ended: impl FnMut(Duration) -> bool) ->
     }
 }
 
+/// The same of a group that an axis has stopped: the others hold where they came to rest.
+///
+/// # Errors
+/// Its cycles have ended.
+pub async fn hold_others(group: &mut Group, mut ended: impl FnMut(Duration) -> bool) -> Result<Duration, GroupError> {
+    let began = group.network().now();
+    loop {
+        group.cycle().await?;
+        let held = group.network().now() - began;
+        if ended(held) {
+            return Ok(held);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

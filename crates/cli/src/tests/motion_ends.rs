@@ -1,5 +1,9 @@
 //! How long a motor turns, and what a drive has after a motion.
 
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use can::{Frame, Instant, Station};
 use processes::scratch;
 
 use super::virtual_bus::VirtualBus;
@@ -66,4 +70,58 @@ fn a_move_into_a_limit_that_is_active_names_the_input() {
     let bench = VirtualBus::of_machine(&machine::file::Machine::parse(text).unwrap()).with(&["--model", "2=zlim42c"]);
     let ended = bench.run(&["move", "2", "-1turn"]);
     assert!(ended.status == Some(1) && ended.err.contains("X0 (negative limit)"), "{}", ended.err);
+}
+
+/// A frame of another master, at its time.
+#[derive(Clone)]
+struct OtherMaster {
+    at: Instant,
+    frame: Arc<Mutex<Option<Frame>>>,
+    now: Instant,
+}
+
+impl Station for OtherMaster {
+    fn handle_frame(&mut self, _: &Frame, now: Instant) {
+        self.now = now;
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.now = now;
+    }
+
+    fn poll_transmit(&mut self) -> Option<Frame> {
+        if self.now >= self.at { self.frame.lock().unwrap().take() } else { None }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.frame.lock().unwrap().is_some().then_some(self.at)
+    }
+}
+
+/// An axis that is stopped by another master ends the motion of all; who it was is said, and of which axes the power was taken. With `--hold`
+/// the others hold until then.
+#[test]
+fn a_group_that_is_stopped_names_who_did_it_and_holds_with_the_others_where_that_was_asked_for() {
+    for is_held in [false, true] {
+        let bench = VirtualBus::of(&["cia402@4", "cia402@5"]).with(&["--model", "4=cia402", "--model", "5=cia402"]);
+        let at = bench.world().now() + Duration::from_secs(2);
+        // A quick stop for node 5 (CiA 402-2, 8.4.1), which ends without power (605Ah = 2).
+        let frame = Arc::new(Mutex::new(Some("605#2B40600002000000".parse().unwrap())));
+        bench.world().add_station(OtherMaster { at, frame, now: Instant::ZERO });
+        let group = ["group", "move", "--relative", "4=2turn", "5=2turn"];
+        let hold: &[&str] = if is_held { &["--hold", "3s"] } else { &[] };
+        let ended = bench.run(&[&group, hold].concat());
+        let took = bench.world().now() - at;
+        assert_eq!(ended.status, Some(1), "{}", ended.err);
+        for part in [
+            "another master wrote 2h to 6040h:00",
+            "node 5 had lost its power, and the power of node 4 was taken at the end",
+        ] {
+            assert!(ended.err.contains(part), "{is_held}: {part:?} in {}", ended.err);
+        }
+        assert!(!ended.err.contains("--tolerance"), "{}", ended.err);
+        assert_eq!(ended.err.contains("The other axes hold for 3 s"), is_held, "{}", ended.err);
+        assert_eq!(took >= Duration::from_secs(3), is_held, "{took:?}");
+        assert!([4, 5].iter().all(|node| bench.report(*node).statusword.is_none_or(|word| word & 0x6F != 0x27)));
+    }
 }

@@ -389,10 +389,19 @@ impl Base {
 
     /// The question of [`explain_stop`](Self::explain_stop) alone, for a base that is stepped elsewhere meanwhile.
     pub fn explanation(&self) -> Option<impl Future<Output = Option<Error>> + Send + use<>> {
-        let StopCause::Wheel { node, refusal } = self.state.cause? else { return None };
+        let (node, refusal) = match self.state.cause? {
+            StopCause::Wheel { node, refusal } => (node, Some(refusal)),
+            StopCause::Lag { node, .. } => (node, None),
+            StopCause::Watchdog { .. } => return None,
+        };
         let [left, right] = &self.drives;
         let drive = if left.node().id() == node { left } else { right }.clone();
-        Some(async move { drive.explain_refusal(refusal).await })
+        Some(async move {
+            match refusal {
+                Some(refusal) => drive.explain_refusal(refusal).await,
+                None => drive.explain_overruled().await,
+            }
+        })
     }
 
     fn lost_wheel(&self) -> Option<StopCause> {

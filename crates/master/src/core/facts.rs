@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use can::Instant;
 use canopen::emcy::{Emcy, EmcyErrorCode};
-use canopen::{NmtCommand, NmtState};
+use canopen::{Mux, NmtCommand, NmtState};
 use devices::Description;
 
 use super::twins::{Heartbeats, Twins};
@@ -37,6 +37,8 @@ pub struct NodeFacts {
     /// When it was last written to: an SDO download had ended, or an RPDO left. What it sent before does not reflect
     /// that.
     pub written_at: Option<Instant>,
+    /// The last request of another SDO client to write an object of the device profile; forgotten at its boot-up.
+    pub other_write: Option<OtherWrite>,
     /// It has answered SDO block transfer with 0504 0001h, and has not booted since: then it may be another device, or another firmware.
     pub refuses_blocks: bool,
     /// SDO answers that no client had asked for.
@@ -45,6 +47,17 @@ pub struct NodeFacts {
     pub twins: Option<Twins>,
     pub(super) heartbeats: Heartbeats,
     emcys: VecDeque<(Instant, Emcy)>,
+}
+
+/// A request to write that was heard on the bus. Source: CiA 301, 7.2.4.3.3.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OtherWrite {
+    /// When it came.
+    pub at: Instant,
+    /// The object.
+    pub object: Mux,
+    /// The value, where it came in the request, with 0 for bytes that are not there.
+    pub value: Option<u32>,
 }
 
 /// Watch over a node's heartbeat, or over its answers to node guarding. Source: CiA 301, 7.2.8.2.
@@ -111,6 +124,7 @@ impl NodeFacts {
         if booted {
             self.boot_up = Some((now, self.boot_up.map_or(1, |(_, count)| count.saturating_add(1))));
             self.nmt_sent = None;
+            self.other_write = None;
             self.refuses_blocks = false;
         }
         let Some(watch) = &mut self.heartbeat_watch else { return false };

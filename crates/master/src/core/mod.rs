@@ -35,7 +35,7 @@ use cia402::object::STATUSWORD;
 
 pub use cycle::Cycle;
 pub use event::{Event, Silence, two_devices};
-pub use facts::{HeartbeatWatch, NodeFacts};
+pub use facts::{HeartbeatWatch, NodeFacts, OtherWrite};
 pub(crate) use field::bits_of;
 pub use field::{Field, NumberForm, Sample, SetPoint, Signal};
 pub use frame_log::{FrameLogs, LoggedFrame};
@@ -460,7 +460,7 @@ impl Station for Core {
                 node
             }
             // Another client's: the answer to it is not ours.
-            Some(Service::SdoRequest(node)) => return self.member_mut(node).answers.asked(frame, now),
+            Some(Service::SdoRequest(node)) => return self.handle_other_request(node, frame),
             Some(Service::Sync) => return self.handle_sync(),
             Some(Service::Nmt) => return self.handle_nmt(frame),
             _ => return,

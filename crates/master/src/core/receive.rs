@@ -1,12 +1,16 @@
+use std::ops::Range;
+
 use can::Frame;
 use canopen::emcy::Emcy;
 use canopen::heartbeat::Heartbeat;
 use canopen::nmt::NmtRequest;
+use canopen::sdo::wire::{Payload, Request};
 use canopen::{Mux, NmtState, NodeId, connection_set};
 
 use super::Core;
 use super::answers::ENOUGH;
 use super::event::Event;
+use super::facts::OtherWrite;
 use super::request::{Failure, Outcome};
 use super::twins::Twins;
 
@@ -28,6 +32,24 @@ impl Core {
                     self.events.push(Event::NoAnswer(node, mux, waited), now);
                 }
             }
+        }
+    }
+
+    /// Another client asks a node: what it writes to the device profile may be why a motion of this program ends.
+    pub(super) fn handle_other_request(&mut self, node: NodeId, frame: &Frame) {
+        /// Of standardised devices (CiA 301, table 36).
+        const DEVICE_PROFILE: Range<u16> = 0x6000..0xA000;
+        let at = self.now;
+        let member = self.member_mut(node);
+        member.answers.asked(frame, at);
+        if let Request::InitiateDownload(object, payload) = Request::parse(frame.padded())
+            && DEVICE_PROFILE.contains(&object.index)
+        {
+            let value = match payload {
+                Payload::Expedited { bytes, .. } => Some(u32::from_le_bytes(bytes)),
+                Payload::Segmented { .. } => None,
+            };
+            member.facts.other_write = Some(OtherWrite { at, object, value });
         }
     }
 

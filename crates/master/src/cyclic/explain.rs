@@ -1,9 +1,11 @@
 //! Why a drive does not follow its set-points, asked by SDO as the intents ask it.
 
+use canopen::{NmtCommand, NmtState};
 use cia402::PowerCommand;
 
 use super::demand::Refusal;
-use crate::drive::{ANSWER, Drive, Trigger};
+use crate::core::CycleLoss;
+use crate::drive::{ANSWER, Drive, LATELY, Trigger};
 use crate::error::Error;
 
 const INTENT: &str = "follow its set-points cycle by cycle";
@@ -20,9 +22,25 @@ impl Drive {
                 let drive = self.asked_within(ANSWER);
                 return Some(drive.not_reached(INTENT, Trigger::Ignored(PowerCommand::EnableOperation)).await);
             }
+            Refusal::Stopped(CycleLoss::Silent(_)) => return self.explain_overruled().await,
             Refusal::OutOfLimits { asked, bound } => return self.check_effect(bound.object, asked).await.err(),
             _ => return None,
         };
         Some(self.not_reached(INTENT, trigger).await)
+    }
+
+    /// What another master was seen to command, where that may be why a shaft does not follow or a TPDO stays away: another NMT state, or
+    /// a value of an object of the device profile. `None` where nothing of it was seen.
+    pub async fn explain_overruled(&self) -> Option<Error> {
+        let (seen, now) = (self.node().facts(), self.node().network().now());
+        let state = seen.probable_state(self.description());
+        let is_commanded =
+            seen.nmt_sent.is_some_and(|(at, command)| command != NmtCommand::Start && now - at <= LATELY);
+        let is_away = is_commanded && state.is_some_and(|state| state != NmtState::Operational);
+        let is_written = seen.other_write.is_some_and(|write| now - write.at <= LATELY);
+        if !is_away && !is_written {
+            return None;
+        }
+        Some(self.asked_within(ANSWER).not_reached(INTENT, Trigger::Overruled).await)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use canopen::Mux;
+use canopen::{Mux, NmtState};
 use cia402::{ModeOfOperation, PowerCommand, PowerState};
 use devices::PowerStyle;
 use devices::faults::FaultRow;
@@ -45,6 +45,8 @@ pub(crate) enum Trigger {
     NotHome { at: f64, waited: Duration },
     /// Homing ended without a home position.
     HomingFailed(i8),
+    /// It does not follow, and its node or its objects were commanded otherwise.
+    Overruled,
     /// It stopped answering.
     Silent(Error),
 }
@@ -79,18 +81,32 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
     if let Some((code, rows)) = faults.filter(|_| at_fault || style != PowerStyle::Cia402) {
         return faulted(code, rows);
     }
+    let by = overruled(trigger, facts);
     match (trigger, state) {
         (_, Some(PowerState::Fault | PowerState::FaultReactionActive)) => text(
             "The drive is at fault and gives no fault code",
             "Look at its display or error history, remove the cause, then reset the fault",
         ),
-        (Trigger::LostOperation, Some(PowerState::QuickStopActive)) => text(
-            "A quick stop came in the middle of the motion, from another master or an emergency stop input",
-            "Find out what asked for it; when it is safe, enable the drive again to release the quick stop",
+        (Trigger::LostOperation, Some(PowerState::QuickStopActive)) => (
+            match by {
+                Some(by) => format!("A quick stop came in the middle of the motion: {by}"),
+                None => "A quick stop came in the middle of the motion, from another master or an emergency stop input"
+                    .into(),
+            },
+            "Find out what asked for it; when it is safe, enable the drive again to release the quick stop".to_owned(),
         ),
-        (Trigger::LostOperation, Some(state)) => (
-            format!("The drive left Operation enabled in the middle of the motion and is in {}", state.name()),
-            "Find out who else commands it (another master, an RPDO, the enable input), or whether its supply dipped"
+        (Trigger::LostOperation, Some(state)) => {
+            let left =
+                format!("The drive left Operation enabled in the middle of the motion and is in {}", state.name());
+            (
+                by.map_or(left.clone(), |by| format!("{left}: {by}")),
+                "Find out who else commands it (another master, an RPDO, the enable input), or whether its supply dipped"
+                    .to_owned(),
+            )
+        }
+        (Trigger::Overruled, Some(_)) => (
+            format!("It is commanded by two masters: {}", by.as_deref().unwrap_or("another one stopped it")),
+            "Find out who else commands it: another master, a PLC, a pendant. When it is safe, start the motion again"
                 .to_owned(),
         ),
         (_, None) if seen.is_some() => text(
@@ -100,6 +116,28 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
         _ => without_ramp(by_trigger(trigger, style), facts),
     }
 }
+
+/// Who commands it otherwise, as far as that was seen on the bus.
+fn overruled(trigger: &Trigger, facts: &[Fact]) -> Option<String> {
+    let is_overruled = matches!(trigger, Trigger::Overruled);
+    let of = |fact: &Fact| match fact {
+        // Other motions need no operational node.
+        Fact::Nmt(state) if is_overruled && *state != NmtState::Operational => {
+            Some(format!("an NMT command of another master has taken its node to {state}, where no PDO comes or goes"))
+        }
+        Fact::OtherWrite(age, object, value) if is_overruled || object.index & AXIS_OBJECT == CONTROLWORD => {
+            let value = value.map_or(String::new(), |value| format!(" {value:X}h"));
+            Some(format!("another master wrote{value} to {object} {:.1} s before", age.as_secs_f64()))
+        }
+        _ => None,
+    };
+    facts.iter().find_map(of)
+}
+
+/// The place of an object among those of its axis, which lie 800h apart (CiA 402-2, 5.4).
+const AXIS_OBJECT: u16 = 0x07FF;
+/// That of 6040h.
+const CONTROLWORD: u16 = 0x6040 & AXIS_OBJECT;
 
 /// Adds what there is to do where a rate of 0 may be why the speed does not change.
 fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (String, String) {
@@ -182,7 +220,11 @@ fn by_trigger(trigger: &Trigger, style: PowerStyle) -> (String, String) {
         Trigger::Late { at, target, unit, waited } => late(*at, *target, unit, *waited),
         Trigger::Elsewhere { at, target, unit, by } => elsewhere(*at, *target, unit, by),
         Trigger::Unseen { sensor, remedy } => unseen(sensor, remedy),
-        Trigger::Fault | Trigger::LostOperation | Trigger::HeldUp(_) | Trigger::Silent(_) => text(
+        Trigger::Fault
+        | Trigger::LostOperation
+        | Trigger::Overruled
+        | Trigger::HeldUp(_)
+        | Trigger::Silent(_) => text(
             "The drive is no longer where it was a moment ago",
             "Read its state again: it changes while it is read",
         ),

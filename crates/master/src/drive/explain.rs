@@ -11,6 +11,9 @@ use crate::error::{Error, Explanation, Fact};
 use crate::explain::{Finding, Observed, Topic};
 use crate::units::Volts;
 
+/// How far back what another master has commanded may be why a drive does not do what it should.
+pub(crate) const LATELY: Duration = Duration::from_secs(10);
+
 /// How long a motion that does not get there is looked at before it is stopped: some thirty answers, and 100 ms between two looks at its speed.
 const LOOK: Duration = Duration::from_millis(300);
 
@@ -131,5 +134,7 @@ impl Drive {
                 self.description.and_then(|description| description.fault_reported_by(emcy.code)),
             )
         }));
+        let write = seen.other_write.filter(|write| now - write.at <= LATELY);
+        facts.extend(write.map(|write| Fact::OtherWrite(now - write.at, write.object, write.value)));
     }
 }

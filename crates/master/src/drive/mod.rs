@@ -31,6 +31,7 @@ pub use crate::limits::{HeldBy, Limits, Setting};
 pub use command::{Command, Manner, Motion, ParseCommandError, Report};
 pub(crate) use conclude::Trigger;
 pub use everything::{StopWay, StoppedAxis};
+pub(crate) use explain::LATELY;
 pub use explain::faults_in;
 pub(crate) use goal::REACHED_TURNS;
 pub use guard::SwitchedOff;

@@ -433,6 +433,8 @@ pub enum Fact {
     Heartbeat(Option<Duration>),
     /// Its last emergency message, how long ago it came, and what it means on this model.
     Emcy(Duration, Emcy, Option<&'static FaultRow>),
+    /// Another SDO client has asked it to write an object, so long ago; the value, where it came in the request.
+    OtherWrite(Duration, Mux, Option<u32>),
     /// A request that failed while looking.
     Failed(Box<Error>),
 }
@@ -469,6 +471,10 @@ impl fmt::Display for Fact {
                 write!(f, "EMCY {:04X}h ({}) {:.1} s ago", emcy.code.0, row.name, age.as_secs_f64())
             }
             Self::Emcy(age, emcy, None) => write!(f, "EMCY {} {:.1} s ago", emcy.code, age.as_secs_f64()),
+            Self::OtherWrite(age, object, value) => {
+                write!(f, "{object} written by another master {:.1} s ago", age.as_secs_f64())?;
+                value.map_or(Ok(()), |value| write!(f, " ({value:X}h)"))
+            }
             Self::Failed(error) => write!(f, "{error}"),
         }
     }

@@ -371,9 +371,18 @@ impl Group {
 
     /// The question of [`explain_stop`](Self::explain_stop) alone, for a group that is stepped elsewhere meanwhile.
     pub fn explanation(&self) -> Option<impl Future<Output = Option<Error>> + Send + use<>> {
-        let StopCause::Axis { axis, refusal, .. } = self.runner.cause? else { return None };
+        let (axis, refusal) = match self.runner.cause? {
+            StopCause::Axis { axis, refusal, .. } => (axis, Some(refusal)),
+            StopCause::FollowingError { axis, .. } => (axis, None),
+            _ => return None,
+        };
         let drive = self.drives.get(axis.checked_sub(1)?)?.clone();
-        Some(async move { drive.explain_refusal(refusal).await })
+        Some(async move {
+            match refusal {
+                Some(refusal) => drive.explain_refusal(refusal).await,
+                None => drive.explain_overruled().await,
+            }
+        })
     }
 
     /// A stop that was asked for does not outlast the next command.

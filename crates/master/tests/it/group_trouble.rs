@@ -176,6 +176,42 @@ fn a_drive_with_a_fault_of_its_own_is_reported_with_its_text_and_the_others_stop
     assert!(left.abs() < 0.5 && right.abs() < 0.5, "{left} {right}");
 }
 
+/// Two programs that command one machine: what the other one did is named, and not the load or the cable of the drive.
+#[test]
+fn what_another_master_commands_is_named_as_the_cause() {
+    for (frame, causes) in [
+        // A quick stop (CiA 402-2, 8.4.1): the drive shows it.
+        (
+            "602#2B40600002000000",
+            ["is in Switch on disabled: another master wrote 2h to 6040h:00", "Find out who else commands it"],
+        ),
+        // Max torque: it lags behind.
+        (
+            "602#2B72600000000000",
+            [
+                "It is commanded by two masters: another master wrote 0h to 6072h:00",
+                "6072h:00 written by another master",
+            ],
+        ),
+        // NMT enter pre-operational: its TPDO stays away.
+        ("000#8002", ["an NMT command of another master has taken its node to pre-operational", "no PDO comes"]),
+    ] {
+        let mut bench = Bench::moving();
+        let probe = bench.world.add_probe();
+        bench.world.send(probe, frame.parse().unwrap()).unwrap();
+        let error = block_on(&mut bench.world, bench.group.rest()).unwrap().unwrap_err();
+        assert!(matches!(error, GroupError::Stopped(_)), "{frame}: {error}");
+        let said = block_on(&mut bench.world, bench.group.explain_stop()).unwrap().unwrap().to_string();
+        assert!(causes.iter().all(|cause| said.contains(cause)), "{frame}: {error}: {said}");
+    }
+    // A shaft that is held was commanded by one master alone.
+    let mut bench = Bench::moving();
+    bench.world.apply(Place::node(2), &"rotor lock".parse().unwrap()).unwrap().unwrap();
+    let error = block_on(&mut bench.world, bench.group.rest()).unwrap().unwrap_err();
+    assert!(matches!(error, GroupError::Stopped(StopCause::FollowingError { axis: 2, .. })), "{error}");
+    assert!(block_on(&mut bench.world, bench.group.explain_stop()).unwrap().is_none());
+}
+
 #[test]
 fn no_stop_leads_over_a_software_limit() {
     let mut bench = Bench::new();

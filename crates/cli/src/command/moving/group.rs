@@ -9,9 +9,11 @@ use canopen::NodeId;
 use cia402::ModeOfOperation;
 use host::group_follow::{GroupFollow, PlannedFollow, RecordedPath};
 use machine::file::GroupPlan;
-use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, rate, target, turning};
+use machine::group_move::{
+    GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, hold_others, rate, target, turning,
+};
 use master::Drive;
-use master::group::{AxisLimits, AxisSetup, Group, GroupError, StopCause};
+use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StopCause};
 use master::units::{Along, Angle, Rpm, Shown, parse_duration};
 use serde::Serialize;
 use words::mode::mode;
@@ -372,8 +374,12 @@ impl GroupOptions {
         let moved = match opened {
             Ok(mut group) => {
                 let moved = self.move_and_hold(context, &mut group, planned).await;
-                let closed = group.close().await.map_err(Failure::from);
-                moved.and_then(|seen| closed.map(|()| seen))
+                let power = power_taken(&group);
+                match (moved, group.close().await) {
+                    (Ok(seen), closed) => closed.map(|()| seen).map_err(Failure::from),
+                    (Err(failure), Ok(())) => Err(power.into_iter().fold(failure, Failure::because)),
+                    (Err(failure), Err(error)) => Err(failure.because(error)),
+                }
             }
             Err(error) => Err(error.into()),
         };
@@ -415,19 +421,60 @@ impl GroupOptions {
             Err(error) => {
                 let cause = if let GroupError::Stopped(cause) = error { Some(cause) } else { None };
                 let reason = if cause.is_some() { group.explain_stop().await } else { None };
+                // What another master did needs no longer period.
+                let is_late = reason.is_none();
                 let failure = reason.into_iter().fold(Failure::from(error), Failure::because);
-                Err(match cause {
-                    Some(StopCause::Axis { refusal, .. }) => self.cycles.advised(failure, refusal),
+                let failure = match cause {
+                    Some(StopCause::Axis { refusal, .. }) if is_late => self.cycles.advised(failure, refusal),
                     _ => failure,
-                })
+                };
+                if let (Some(time), Some(StopCause::Axis { .. })) = (self.hold, cause) {
+                    keep_others(context, group, time, &failure.what).await?;
+                }
+                Err(failure)
             }
         }
     }
 }
 
+/// After an axis has stopped the group: those that follow hold on as they were to hold at the end, and do not fall with it.
+async fn keep_others(
+    context: &Context,
+    group: &mut Group,
+    time: Option<Duration>,
+    what: &str,
+) -> Result<(), GroupError> {
+    if group.state().phase != Phase::Holding || group.axes().iter().all(|axis| !axis.follows) {
+        return Ok(());
+    }
+    let Some(time) = time else {
+        context.note(&format!(
+            "{what}. The other axes hold; the end of standard input (Ctrl-D) takes their power, {POWER}: {PULLING_LOAD}"
+        ));
+        let input = end_of_input();
+        return hold_others(group, |_| input.load(Ordering::Relaxed)).await.map(|_| ());
+    };
+    let time_s = Shown(time.as_secs_f64());
+    context.note(&format!("{what}. The other axes hold for {time_s} s, then their power is taken; {POWER}"));
+    hold_others(group, |held| held >= time).await.map(|_| ())
+}
+
+/// Of a group that is about to be closed: of which axes that takes the power; `None` where none has any.
+fn power_taken(group: &Group) -> Option<String> {
+    let nodes = |is_live: bool| {
+        let axes = group.drives().iter().zip(group.axes()).filter(|(_, axis)| axis.is_live == is_live);
+        axes.map(|(drive, _)| format!("node {}", drive.node().id())).collect::<Vec<_>>().join(", ")
+    };
+    let (powered, without) = (nodes(true), nodes(false));
+    let before = if without.is_empty() { String::new() } else { format!("{without} had lost its power, and ") };
+    (!powered.is_empty()).then(|| format!("{before}the power of {powered} was taken at the end: {PULLING_LOAD}"))
+}
+
+/// How long a signal leaves them so.
+const POWER: &str = "Ctrl-C quick-stops the drives";
+
 /// Holds for so long, or until standard input ends.
 async fn keep(context: &Context, group: &mut Group, time: Option<Duration>) -> Result<Duration, GroupError> {
-    const POWER: &str = "Ctrl-C quick-stops the drives";
     let axes = group.axes().len();
     let Some(time) = time else {
         context.note(&format!(
