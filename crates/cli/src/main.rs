@@ -127,7 +127,8 @@ fn matches() -> Result<ArgMatches, clap::Error> {
         }
     };
     let meant = meant.map(|text| format!("did you mean: {text}"));
-    match meant.or_else(|| senses::stop_of_one(&command, &words)) {
+    let other = senses::restore_of_file(&command, &words);
+    match other.or(meant).or_else(|| senses::stop_of_one(&command, &words)) {
         Some(tip) => suggest(&mut error, vec![tip]),
         None => match tips::further(&command, &words, error.kind()) {
             Some(further) => return Err(further),

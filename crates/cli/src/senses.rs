@@ -441,6 +441,22 @@ pub(crate) fn stop_of_one(command: &Command, words: &[String]) -> Option<String>
     parses(command, &line).then(|| format!("`ferrodrive estop` stops every drive; one is stopped by: {}", text(&line)))
 }
 
+/// What is said to `restore 4 backup.toml`: factory settings and a backup come back by different commands.
+pub(crate) fn restore_of_file(command: &Command, words: &[String]) -> Option<String> {
+    // Not that of --machine.
+    let is_file = |at: &usize| {
+        let of_option = at.checked_sub(1).is_some_and(|before| words[before].starts_with("--"));
+        ends_in(&words[*at], &["toml", "dcf", "bin", "csv"]) && !of_option
+    };
+    let file = (0..words.len()).find(is_file)?;
+    let place = words.iter().position(|word| word == "restore")?;
+    let mut line = words.to_vec();
+    line.splice(place..=place, ["params".to_owned(), "apply".to_owned()]);
+    let meant = parses(command, &line).then(|| text(&line));
+    let meant = meant.unwrap_or_else(|| format!("ferrodrive params apply 4 {}", words[file]));
+    Some(format!("`ferrodrive restore` loads factory settings, from no file; a backup is written back by: {meant}"))
+}
+
 /// Whether a command that is spelt nearly so may be named: what moves a motor only where it was typed but for a slip of the finger.
 pub(crate) fn may_be_meant(word: &str, command: &str) -> bool {
     let begin = |text: &str| text.chars().take(2).collect::<String>().to_ascii_lowercase();

@@ -137,6 +137,11 @@ pub enum Need {
 }
 
 impl Need {
+    /// What the device has is not asked then.
+    pub(crate) const fn is_a_leave(self) -> bool {
+        matches!(self, Self::Motion | Self::Store)
+    }
+
     fn is_met(self, subject: &Subject, options: &Options) -> bool {
         let description = subject.description;
         let axis = description.first_axis();

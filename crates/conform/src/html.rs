@@ -8,10 +8,13 @@ use crate::case::Group;
 use crate::cases;
 use crate::report::{CaseResult, Outcome, Report};
 
+/// Under which circumstances a device was tested, for the page: a name and a value each, as "Date" and "2026-03-01 12:00 UTC".
+pub type Circumstances<'a> = [(&'a str, String)];
+
 /// The report as one self-contained page of HTML: no script, nothing that is loaded.
-pub fn html(report: &Report) -> String {
+pub fn html(report: &Report, circumstances: &Circumstances<'_>) -> String {
     let mut out = String::new();
-    head(&mut out, report);
+    head(&mut out, report, circumstances);
     for group in groups() {
         let of_group = |case: &&CaseResult| cases::all().any(|row| row.id == case.id && row.group() == group);
         let results: Vec<&CaseResult> = report.cases.iter().filter(of_group).collect();
@@ -37,7 +40,7 @@ fn groups() -> Vec<Group> {
     groups
 }
 
-fn head(out: &mut String, report: &Report) {
+fn head(out: &mut String, report: &Report, circumstances: &Circumstances<'_>) {
     let summary = report.summary;
     let verdict = match summary.fail {
         0 => "<span class=\"pass\">No case failed</span>".to_owned(),
@@ -50,12 +53,17 @@ fn head(out: &mut String, report: &Report) {
     for (name, number) in names.iter().zip(&report.identity) {
         let _ = write!(out, "<dt>{name}</dt><dd>{number:08X}h</dd>");
     }
-    let _ = write!(out, "<dt>Judged by</dt><dd>{}</dd></dl><div class=\"sum\">", escaped(&report.source));
+    let _ = write!(out, "<dt>Judged by</dt><dd>{}</dd>", escaped(&report.source));
+    for (name, value) in circumstances {
+        let _ = write!(out, "<dt>{}</dt><dd>{}</dd>", escaped(name), escaped(value));
+    }
+    out.push_str("</dl><div class=\"sum\">");
     for (class, count, words) in [
         ("pass", summary.pass, "passed"),
         ("fail", summary.fail, "failed"),
         ("expected", summary.expected, "depart as the manual states"),
         ("na", summary.not_applicable, "do not apply"),
+        ("na", summary.not_run, "were not run"),
     ] {
         let _ = write!(out, "<div class=\"{class}\"><b>{count}</b><span>{words}</span></div>");
     }
@@ -79,7 +87,7 @@ fn table(out: &mut String, group: Group, results: &[&CaseResult]) {
             Outcome::Pass => ("pass", ""),
             Outcome::Fail => ("fail", " class=\"f\""),
             Outcome::Expected => ("expected", ""),
-            Outcome::NotApplicable => ("na", ""),
+            Outcome::NotApplicable | Outcome::NotRun => ("na", ""),
         };
         let _ = write!(
             out,

@@ -10,7 +10,7 @@ use crate::report::{Outcome, Report};
 /// skipped with the reason.
 pub fn junit(report: &Report) -> String {
     let summary = report.summary;
-    let skipped = summary.expected + summary.not_applicable;
+    let skipped = summary.expected + summary.not_applicable + summary.not_run;
     let mut out = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let name = escaped(&format!("conformance of node {} ({})", report.node, report.model));
     let _ = writeln!(
@@ -32,7 +32,7 @@ pub fn junit(report: &Report) -> String {
             Outcome::Expected => {
                 let _ = write!(out, "<skipped message=\"expected: {why}\"/>");
             }
-            Outcome::NotApplicable => {
+            Outcome::NotApplicable | Outcome::NotRun => {
                 let _ = write!(out, "<skipped message=\"{why}\"/>");
             }
         }

@@ -47,7 +47,7 @@ pub use bench::Restorer;
 pub use capture::Capture;
 pub use case::{Case, Group, Need};
 pub use cases::all;
-pub use html::html;
+pub use html::{Circumstances, html};
 pub use junit::junit;
 pub use options::Options;
 pub use report::{CaseResult, Outcome, Report, Summary};

@@ -14,6 +14,8 @@ pub enum Outcome {
     Expected,
     /// The case says nothing about this device.
     NotApplicable,
+    /// It takes a leave that was not given: to move a motor, or to store parameters.
+    NotRun,
 }
 
 impl Outcome {
@@ -24,6 +26,7 @@ impl Outcome {
             Self::Fail => "fail",
             Self::Expected => "expected",
             Self::NotApplicable => "not applicable",
+            Self::NotRun => "not run",
         }
     }
 }
@@ -56,6 +59,8 @@ pub struct Summary {
     pub expected: usize,
     /// Nothing was said.
     pub not_applicable: usize,
+    /// Nothing was asked, for want of a leave.
+    pub not_run: usize,
 }
 
 /// What came of a run.
@@ -92,6 +97,7 @@ impl Report {
             fail: count(Outcome::Fail),
             expected: count(Outcome::Expected),
             not_applicable: count(Outcome::NotApplicable),
+            not_run: count(Outcome::NotRun),
         }
     }
 }

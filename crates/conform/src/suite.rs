@@ -196,7 +196,8 @@ impl Suite {
     async fn absent(&mut self, need: Need) -> (Outcome, String, Vec<String>) {
         let subject = self.bench.subject;
         let (Some(departure), Some(object)) = (stated_absence(&subject, need), need.object()) else {
-            return (Outcome::NotApplicable, need.to_string(), Vec::new());
+            let outcome = if need.is_a_leave() { Outcome::NotRun } else { Outcome::NotApplicable };
+            return (outcome, need.to_string(), Vec::new());
         };
         self.bench.begin();
         let (outcome, why) = self.shown(&departure, object).await;

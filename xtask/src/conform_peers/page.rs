@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 
-const HEAD: &str = "| stack | passed | failed | not applicable |";
+const HEAD: &str = "| stack | passed | failed | not applicable, not run |";
 
 /// The page with this row in its table, in place of that of the same stack.
 pub(super) fn with_row(page: &str, stack: &str, counts: [u64; 3]) -> Result<String, String> {
@@ -87,7 +87,7 @@ fn ids(cell: &str) -> Result<Vec<String>, String> {
 mod tests {
     use super::*;
 
-    const PAGE: &str = "# Page\n\n| stack | passed | failed | not applicable |\n|---|---|---|---|\n| a 1 | 1 | 2 | 3 |\n\n\
+    const PAGE: &str = "# Page\n\n| stack | passed | failed | not applicable, not run |\n|---|---|---|---|\n| a 1 | 1 | 2 | 3 |\n\n\
                         **a 1.** All theirs.\n\n| cases | seen | clause |\n|---|---|---|\n| SDO 05, 07, PDO 23 to 25 | x, `605#40` `585#` | CiA 301, 7.2 |\n\n\
                         **b.** None.\n";
 

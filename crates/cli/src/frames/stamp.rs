@@ -5,6 +5,7 @@ use std::time::Duration;
 use can::Instant;
 use canopen::time_stamp::civil_date;
 use clap::ValueEnum;
+use transport::WallClock;
 
 /// How times are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -63,6 +64,13 @@ pub(crate) fn absolute(unix: Duration) -> String {
     let (year, month, day) = civil_date(days);
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     format!("{year}-{month:02}-{day:02} {hours:02}:{minutes:02}:{seconds:02}.{:06}", unix.subsec_micros())
+}
+
+/// Now, to the minute, for a page that is kept.
+pub(crate) fn to_the_minute() -> String {
+    let clock = WallClock::start();
+    let now = clock.unix_zero() + Duration::from_nanos(clock.now().as_nanos());
+    format!("{} UTC", absolute(now).get(..16).unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ fn a_model_passes_and_its_departures_are_cited() {
     assert_eq!((&report["ok"], &report["summary"]["fail"]), (&true.into(), &0.into()));
     let count =
         |result: &str| report["cases"].as_array().unwrap().iter().filter(|case| case["result"] == result).count();
-    for result in ["pass", "fail", "expected", "not_applicable"] {
+    for result in ["pass", "fail", "expected", "not_applicable", "not_run"] {
         assert_eq!(report["summary"][result], count(result), "{result}");
     }
     // ZLAC8030L quick start guide: no 1010h in the list of chapter 9, times of PDOs in 0.5 ms by the example of 6.1.
@@ -23,7 +23,7 @@ fn a_model_passes_and_its_departures_are_cited() {
         assert!(case["why"].as_str().unwrap().contains(&format!("V1.00, {section})")), "{case}");
         assert!(case["frames"].as_array().unwrap().contains(&request.into()), "the frames show it: {case}");
     }
-    assert_eq!(of("402-32")["result"], "not_applicable", "no motor is energised without leave");
+    assert_eq!(of("402-32")["result"], "not_run", "no motor is energised without leave");
 }
 
 #[test]
@@ -43,6 +43,10 @@ fn a_sheet_that_is_not_the_devices_fails_with_status_1_in_every_form() {
     assert!(junit.contains("tests=\"2\" failures=\"1\"") && junit.contains("<failure message=\""), "{junit}");
     let html = std::fs::read_to_string(html).unwrap();
     assert!(html.contains("1 case failed") && html.contains("584#4300100092010400"), "{html}");
+    // Under which circumstances: the cases of SDO need no motor.
+    let circumstances = "--allow-motion: not given; --allow-store: not given; --only SDO 01,SDO 05";
+    assert!(html.contains(circumstances) && html.contains("<dt>Bus</dt><dd>sim</dd>"), "{html}");
+    assert!(html.contains(" UTC</dd>"), "{html}");
     assert!(!html.contains("http") && !html.contains("<script"), "the page needs nothing else");
     let json = ferrodrive(&["conform", "4", "--eds", &eds, "--only", "SDO 01", "--json"]).json();
     assert_eq!((&json["ok"], &json["error"]["kind"]), (&false.into(), &"conformance".into()), "{json}");

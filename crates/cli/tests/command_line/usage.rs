@@ -189,6 +189,9 @@ fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
     refused(&["scan", "can0"], &["did you mean: ferrodrive --bus can0 scan"]);
     refused(&["home", "2", "17"], &["did you mean: ferrodrive home 2 --method 17"]);
     refused(&["init", "machine.toml"], &["did you mean: ferrodrive init -o machine.toml"]);
+    let applied = "a backup is written back by: ferrodrive params apply 4 before.dcf";
+    refused(&["restore", "4", "before.dcf"], &["loads factory settings", applied]);
+    refused(&["restore", "before.dcf"], &["loads factory settings", applied]);
     refused(&["estop", "4"], &["`ferrodrive estop` stops every drive", "ferrodrive quick-stop 4"]);
     refused(&["sdo", "read", "4", "6064"], &["tip: ferrodrive read 4 6064"]);
     refused(&["--bus", "sim", "fault", "4"], &["tip: ferrodrive --bus sim explain 4"]);

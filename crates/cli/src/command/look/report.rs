@@ -1,13 +1,11 @@
 //! `ferrodrive report`: what is worth keeping about a node, as one page.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use canopen::NodeId;
 use host::network::report::{Made, NodeReport, ReportedCapture, Tuning};
 use master::decode::Decoder;
 use serde::Serialize;
-use transport::WallClock;
 use words::counted;
 use words::document::read_bytes;
 use words::node::node;
@@ -16,7 +14,7 @@ use crate::command::configure::dcf::{keep, new_file};
 use crate::command::record_and_replay::plot::read_record;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::frames::stamp::absolute;
+use crate::frames::stamp::to_the_minute;
 use crate::output::refuse_json_beside;
 use plot::Paint;
 
@@ -82,11 +80,7 @@ impl Report {
             .map(|path| capture(path, self.node, context.decoder()))
             .collect::<Result<Vec<_>, _>>()?;
         let tunings = self.tune.iter().map(|path| tuning(path, self.node)).collect::<Result<Vec<_>, _>>()?;
-        let clock = WallClock::start();
-        let now = clock.unix_zero() + Duration::from_nanos(clock.now().as_nanos());
-        // To the minute.
-        let at = format!("{} UTC", absolute(now).get(..16).unwrap_or_default());
-        let made = Made { at, by: self.by.clone(), bus: context.bus().to_string() };
+        let made = Made { at: to_the_minute(), by: self.by.clone(), bus: context.bus().to_string() };
         let drive = context.known_drive(self.node).await?;
         let mut report = NodeReport::read(&context.progress, &drive, made).await?;
         (report.captures, report.tunings) = (captures, tunings);

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::context::{Context, Restorer};
 use crate::failure::{Failure, refuse_missing_folder};
+use crate::frames::stamp::to_the_minute;
 use crate::global::Global;
 use crate::output::{Format, Report, html_path, junit_path};
 use crate::session;
@@ -18,7 +19,7 @@ use words::node::node;
 /// Test whether a node conforms to CiA 301, CiA 305 and CiA 402
 ///
 /// Sends right and wrong requests and looks at the answers, case by case; docs/conformance.md lists the cases. A result is
-/// pass, fail, expected (the maker's manual states the departure) or not applicable (with the reason). The node is reset
+/// pass, fail, expected (the maker's manual states the departure), not applicable (with the reason) or not run. The node is reset
 /// several times. What is written is put back after each case, and the node is left in its NMT state, also when the
 /// command is interrupted. No motor is energised without --allow-motion, and nothing is stored without --allow-store.
 #[derive(Debug, clap::Args)]
@@ -68,13 +69,24 @@ impl Conform {
         }
         let report = session::run(global, async |context| self.test(context, node).await)?;
         if let Some(path) = &self.html {
-            write(path, &html(&report))?;
+            write(path, &html(&report, &self.circumstances(global)))?;
         }
         if let Some(path) = &self.junit {
             write(path, &junit(&report))?;
         }
         let failure = failure(&report, node);
         format.print_judged(&ReportLine { report: &report }, failure)
+    }
+
+    /// What is asked of a page a year later.
+    fn circumstances(&self, global: &Global) -> [(&'static str, String); 3] {
+        let leave =
+            |option: &str, is_given: bool| format!("{option}: {}", if is_given { "given" } else { "not given" });
+        let mut options = vec![leave("--allow-motion", self.allow_motion), leave("--allow-store", self.allow_store)];
+        for (option, cases) in [("--only", &self.only), ("--skip", &self.skip)] {
+            options.extend((!cases.is_empty()).then(|| format!("{option} {}", cases.join(","))));
+        }
+        [("Date", to_the_minute()), ("Bus", global.bus.to_string()), ("Options", options.join("; "))]
     }
 
     async fn test(&self, context: &Context, node: NodeId) -> Result<conform::Report, Failure> {
@@ -243,7 +255,7 @@ impl Report for ReportLine<'_> {
         let colour = |_, column, cell: &str| match (column, cell) {
             (RESULT, "pass") => Some(paint.good(cell)),
             (RESULT, "fail") => Some(paint.bad(cell)),
-            (RESULT, "not applicable") => Some(paint.dim(cell)),
+            (RESULT, "not applicable" | "not run") => Some(paint.dim(cell)),
             _ => None,
         };
         let mut lines =
@@ -259,8 +271,8 @@ impl Report for ReportLine<'_> {
         }
         let summary = self.report.summary;
         lines.push(format!(
-            "{} passed, {} failed, {} expected by the manual, {} not applicable",
-            summary.pass, summary.fail, summary.expected, summary.not_applicable
+            "{} passed, {} failed, {} expected by the manual, {} not applicable, {} not run",
+            summary.pass, summary.fail, summary.expected, summary.not_applicable, summary.not_run
         ));
         lines.join("\n")
     }
