@@ -124,3 +124,26 @@ fn where_there_is_no_terminal_nothing_is_asked_and_the_status_says_what_is_open(
         (&"m8025e25b50".into(), &"zlim42c-82".into())
     );
 }
+
+/// As the file is made, and with its example of a group in use: nothing to be warned of.
+#[test]
+fn the_file_of_two_of_any_model_passes_its_check_with_its_group_too() {
+    let directory = scratch("init_group");
+    for model in ["zlac8030l", "zlim42c", "m4230e17b50", "m8025e25b80", "cia402"] {
+        let file = directory.join(format!("{model}.toml"));
+        let (path, drives) = (file.to_str().unwrap(), [1, 2].map(|node| format!("{model}@{node}")));
+        let text = done(&["init", "--drive", &drives[0], "--drive", &drives[1], "-o", "-"]).out;
+        let (before, group) = text.split_once("#[[group]]").unwrap();
+        let (group, after) = group.split_once("\n\n").unwrap();
+        let grouped = format!("{before}[[group]]{}\n\n{after}", group.replace("\n#", "\n"));
+        for text in [&text, &grouped] {
+            std::fs::write(&file, text).unwrap();
+            let checked = done(&["--json", "check", path]).json();
+            assert_eq!(
+                (&checked["errors"], &checked["warnings"]),
+                (&0.into(), &0.into()),
+                "{model}: {checked}\n{text}"
+            );
+        }
+    }
+}

@@ -27,6 +27,32 @@ pub struct Track {
     relative: bool,
 }
 
+/// What a path takes of an axis, in turns and s, by the set-points of its cycles.
+#[derive(Clone, Debug, Default)]
+struct AxisNeeds {
+    low: f64,
+    high: f64,
+    speed: f64,
+    acceleration: f64,
+    /// The set-point and the speed before.
+    last: Option<(f64, f64)>,
+}
+
+impl AxisNeeds {
+    /// With the set-point of the next cycle.
+    fn take(&mut self, at: f64, period_s: f64) {
+        let Some((before, speed_before)) = self.last else {
+            (self.low, self.high, self.last) = (at, at, Some((at, 0.0)));
+            return;
+        };
+        let speed = (at - before) / period_s;
+        (self.low, self.high) = (self.low.min(at), self.high.max(at));
+        self.speed = self.speed.max(speed.abs());
+        self.acceleration = self.acceleration.max(((speed - speed_before) / period_s).abs());
+        self.last = Some((at, speed));
+    }
+}
+
 impl Track {
     /// A path for these drives, in the order of their group; a `relative` one begins where each axis stands.
     ///
@@ -95,8 +121,16 @@ impl Track {
             let failure =
                 Failure::from(GroupError::of_path(refused.error, drives.iter().map(|drive| drive.node().id())));
             let what = format!("{} cannot be followed: at {} s {}", self.name, Shown(time_s), failure.what);
-            Failure { what, next: Vec::new(), ..failure }
-                .next("let the path take more time or keep within the limits, or raise a limit; nothing was moved")
+            let failure = Failure { what, next: Vec::new(), ..failure };
+            let (beyond, slower) = self.beyond(limits, period, from);
+            let next = match slower {
+                Some(times) => format!(
+                    "let the path take {:.2} s, {times:.3} times as long, or raise the limits; nothing was moved",
+                    self.duration_s * times
+                ),
+                None => "keep within the limits, or raise a limit; nothing was moved".to_owned(),
+            };
+            beyond.into_iter().fold(failure, Failure::because).next(next)
         })?;
         let mut most = vec![0.0_f64; from.len()];
         for point in self.points(period, from) {
@@ -107,6 +141,42 @@ impl Track {
             countable(drive, Angle::Turns(most), number).await?;
         }
         Ok(())
+    }
+
+    /// What the whole path takes of each axis beyond its limits, in words; and how many times slower it would be within those of speed and
+    /// acceleration, unless no time is enough.
+    fn beyond(&self, limits: &[AxisLimits], period: Duration, from: &[f64]) -> (Vec<String>, Option<f64>) {
+        let mut needs = vec![AxisNeeds::default(); from.len()];
+        for point in self.points(period, from) {
+            needs.iter_mut().zip(point).for_each(|(axis, Turns(at))| axis.take(at, period.as_secs_f64()));
+        }
+        let (mut beyond, mut slower) = (Vec::new(), Some(1.0_f64));
+        for ((node, _), (axis, limits)) in self.axes.iter().zip(needs.iter().zip(limits)) {
+            let degrees = |turns: f64| Shown(turns * 360.0);
+            let outside =
+                limits.range_turns.as_ref().filter(|range| axis.low < *range.start() || axis.high > *range.end());
+            beyond.extend(outside.map(|range| {
+                let [low, high, least, most] = [axis.low, axis.high, *range.start(), *range.end()].map(degrees);
+                format!("node {node}: the path goes from {low} to {high} deg, and {least} to {most} are its range")
+            }));
+            if outside.is_some() {
+                slower = None;
+            }
+            // A path that takes so many times as long has that part of the speed, and the square of that part of the acceleration.
+            for (most, limit, unit, power) in [
+                (axis.speed, limits.velocity_turns_s, "deg/s", 1.0),
+                (axis.acceleration, limits.acceleration_turns_s2, "deg/s2", 0.5),
+            ] {
+                if most > limit * (1.0 + 1e-6) {
+                    let (needed, limit_deg) = (degrees(most), degrees(limit));
+                    beyond.push(format!(
+                        "node {node}: the path takes up to {needed} {unit}, and {limit_deg} are allowed"
+                    ));
+                    slower = slower.map(|times| times.max((most / limit).powf(power)));
+                }
+            }
+        }
+        (beyond, slower.filter(|times| *times > 1.0))
     }
 
     /// That the axes stand where it begins; `from` in turns.

@@ -5,6 +5,7 @@
 //! a blank; a `#` without one stands before a line that counts without it. Nothing is written to a drive.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use can::Bitrate;
 use canopen::object::{PRODUCER_HEARTBEAT_TIME, SERIAL_NUMBER};
@@ -192,6 +193,9 @@ fn edition(model: &'static Description) -> Vec<(String, String)> {
 impl InitReport {
     /// The file for these drives.
     pub fn new(nodes: Vec<InitNode>, bitrate: Option<Bitrate>) -> Self {
+        // A drive that answers is on a bus of the one that it has.
+        let own = || nodes.iter().filter(|node| node.certain).find_map(|node| node.description?.only_bitrate());
+        let bitrate = bitrate.or_else(own);
         let toml = machine_file(&nodes, bitrate);
         let mut report =
             Self { ok: true, error: None, bitrate: bitrate.map(Bitrate::bits_per_second), nodes, file: None, toml };
@@ -342,9 +346,13 @@ fn is_taken(model: &'static Description, node: u8, line: &str) -> bool {
 fn group(text: &mut String, nodes: &[InitNode]) {
     text.push_str(
         "\n# Axes that move as one, each with limits in degrees of its output: `ferrodrive group move FILE`.\n\
-         #[[group]]\n#name = \"arm\"\n#period = \"5ms\"\n",
+         #[[group]]\n#name = \"arm\"\n",
     );
-    for node in nodes.iter().filter(|node| node.model.is_some()).take(2) {
+    // A drive that interpolates over a time of its own goes evenly in cycles of that time.
+    let mut own = nodes.iter().filter_map(|node| node.description?.first_axis()?.interpolation);
+    let period = own.next().unwrap_or(Duration::from_millis(5));
+    let _ = writeln!(text, "#period = \"{period:?}\"");
+    for node in nodes.iter().filter(|node| node.model.is_some()) {
         let _ = writeln!(
             text,
             "#[[group.axis]]\n#node = {}\n#range_deg = [-90, 90]\n#velocity_deg_s = 90\n#acceleration_deg_s2 = 360\n\

@@ -166,8 +166,27 @@ fn a_path_beyond_a_limit_is_refused_with_its_time_and_nothing_is_written() {
             refused.what.starts_with("path.csv cannot be followed: at ") && refused.what.contains(said),
             "{refused}"
         );
-        assert!(refused.next[0].contains("let the path take more time"), "{refused}");
+        // It says of the whole path what it takes, and the time that is enough is.
+        assert!(refused.because.iter().any(|why| why.starts_with("node 1: the path takes up to ")), "{refused}");
+        let (_, times) = refused.next[0].split_once(" s, ").expect("so many times");
+        let times: f64 = times.split(' ').next().unwrap().parse().unwrap();
+        let mut slowed = |factor: f64| {
+            let stretched = |line: &str| {
+                let (time, angle) = line.split_once(',').unwrap();
+                time.parse::<f64>().map_or(line.to_owned(), |time| format!("{},{angle}", time * factor))
+            };
+            let text: String = path.lines().map(|line| stretched(line) + "\n").collect();
+            let mut follow = self::follow(&text);
+            follow.options.acceleration = Some(100.0);
+            bench.plan(&follow)
+        };
+        assert!(slowed(times * 1.02).is_ok() && slowed(times * 0.9).is_err(), "{refused}");
     }
+    // The peak of s - sin(2 pi s) / 2 pi over 3000 deg in 2 s: 2 A / T.
+    let refused = bench.plan(&follow(&path(&[(0.0, 3000.0)]))).err().unwrap();
+    let speed = refused.because[0].strip_prefix("node 1: the path takes up to ").unwrap();
+    let (speed, limit) = speed.split_once(" deg/s, and ").unwrap();
+    assert!((speed.parse::<f64>().unwrap() - 3000.0).abs() < 5.0 && limit == "360 are allowed", "{refused}");
     // The range of the axis in its machine file.
     let machine = Machine::parse(
         "[[drive]]\nmodel = 'zlac8030l'\nnode = 1\n[[group]]\nname = 'one'\n[[group.axis]]\nnode = 1\nrange_deg = [-10, 60]\n\

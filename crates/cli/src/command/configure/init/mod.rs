@@ -39,7 +39,8 @@ pub(crate) struct Init {
     /// A drive and its node-ID, as for `sim`, e.g. zlac8030l@4, instead of asking a bus; may be repeated
     #[arg(long = "drive", value_name = "MODEL@NODE[,KEY=VALUE..]", value_parser = named_drive)]
     drives: Vec<NamedDrive>,
-    /// Bit rate of the bus, where it does not show it, as a CAN interface or a server (default with --drive: 500k)
+    /// Bit rate of the bus, where it does not show it, as a CAN interface or a server (default: that of a drive that has one
+    /// alone, and 500k with --drive)
     #[arg(long, value_name = "RATE")]
     bitrate: Option<Bitrate>,
     /// Write to this file (default, and -: write to standard output)
@@ -83,7 +84,7 @@ impl Init {
         // Before anything is asked for: what cannot be kept is not worth the wait.
         let output = new_file(self.output.as_deref(), self.force)?;
         let (mut nodes, bitrate) = if self.is_without_bus() {
-            (self.named()?, Some(BITRATE))
+            (self.named()?, Some(self.own_bitrate()))
         } else if is_bus_typed || global.bus != (BusSpec::Sim { file: None }) {
             let nodes = session::run(global, async |context| {
                 let (found, _) = look(context).await?;
@@ -115,6 +116,11 @@ impl Init {
         Ok(report)
     }
 
+    /// The bit rate of the drives of `--drive` as far as one has no other.
+    fn own_bitrate(&self) -> Bitrate {
+        self.drives.iter().find_map(|drive| drive.spec.model.only_bitrate()).unwrap_or(BITRATE)
+    }
+
     /// The drives of `--drive`.
     fn named(&self) -> Result<Vec<InitNode>, Failure> {
         let mut seen = BTreeSet::new();
@@ -126,7 +132,7 @@ impl Init {
         }
         // What a drive does not take is refused here, and not by the first command that reads the file.
         for drive in &self.drives {
-            ordered_drive(drive.spec.model, &drive.spec.order(self.bitrate.unwrap_or(BITRATE)))?;
+            ordered_drive(drive.spec.model, &drive.spec.order(self.bitrate.unwrap_or_else(|| self.own_bitrate())))?;
         }
         Ok(self.drives.iter().map(|drive| InitNode::named(&drive.text, &drive.spec)).collect())
     }
