@@ -50,7 +50,7 @@ fn a_recorded_path_is_followed_in_its_time_and_a_bad_one_is_refused_before_there
     refused(
         &["group", "follow", &file, &path, "--relative", "--acceleration", "6deg/s2"],
         1,
-        "let the path take more time",
+        "let the path take 16.94 s, 5.647 times as long",
     );
     refused(&["group", "follow", &file, &path, "--relative", "--approach"], 2, "cannot be used with");
     refused(&["group", "follow", &file, &path, "--hold"], 2, "--hold needs a time");
