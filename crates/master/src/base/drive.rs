@@ -122,10 +122,21 @@ impl Base {
         }
         // Both, before either drive is written to.
         let (left_claim, right_claim) = (left.claim()?, right.claim()?);
-        let wheels = [
-            left.open(&geometry, &limits, period, options, left_claim).await?,
-            right.open(&geometry, &limits, period, options, right_claim).await?,
-        ];
+        let opened = async {
+            Ok::<_, BaseError>([
+                left.open(&geometry, &limits, period, options, left_claim).await?,
+                right.open(&geometry, &limits, period, options, right_claim).await?,
+            ])
+        };
+        let wheels = match opened.await {
+            Ok(wheels) => wheels,
+            Err(error) => {
+                // No base is left that would do it at its end. The first error is the one to report.
+                let _ =
+                    network.put_back([left, right].map(|wheel| wheel.drive.node().id()).into_iter().collect()).await;
+                return Err(error);
+            }
+        };
         network.sync(Some(period));
         Ok(Self {
             now: network.now(),

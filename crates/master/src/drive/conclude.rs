@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use canopen::{Mux, NmtState};
-use cia402::{ModeOfOperation, PowerCommand, PowerState};
+use cia402::{Controlword, ModeOfOperation, PowerCommand, PowerState};
 use devices::PowerStyle;
 use devices::faults::FaultRow;
 
@@ -125,6 +125,12 @@ fn overruled(trigger: &Trigger, facts: &[Fact]) -> Option<String> {
         Fact::Nmt(state) if is_overruled && *state != NmtState::Operational => {
             Some(format!("an NMT command of another master has taken its node to {state}, where no PDO comes or goes"))
         }
+        // One that keeps it enabled stops nothing.
+        Fact::OtherWrite(_, object, Some(value))
+            if object.index & AXIS_OBJECT == CONTROLWORD && value & (0x0F | HALT) == 0x0F =>
+        {
+            None
+        }
         Fact::OtherWrite(age, object, value) if is_overruled || object.index & AXIS_OBJECT == CONTROLWORD => {
             let value = value.map_or(String::new(), |value| format!(" {value:X}h"));
             Some(format!("another master wrote{value} to {object} {:.1} s before", age.as_secs_f64()))
@@ -138,6 +144,8 @@ fn overruled(trigger: &Trigger, facts: &[Fact]) -> Option<String> {
 const AXIS_OBJECT: u16 = 0x07FF;
 /// That of 6040h.
 const CONTROLWORD: u16 = 0x6040 & AXIS_OBJECT;
+/// Bit 8 of a controlword.
+const HALT: u32 = Controlword::HALT as u32;
 
 /// Adds what there is to do where a rate of 0 may be why the speed does not change.
 fn without_ramp((conclusion, advice): (String, String), facts: &[Fact]) -> (String, String) {

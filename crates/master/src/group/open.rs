@@ -39,7 +39,8 @@ impl Group {
     /// already have power are switched off by [`enable`](Group::enable) and on again, all together. Nothing moves.
     ///
     /// # Errors
-    /// [`GroupError`], before any drive was written to where the limits are wrong or an axis is taken.
+    /// [`GroupError`], before any drive was written to where the limits are wrong or an axis is taken; else what was written for the
+    /// cycles is put back, as at the end of a group.
     pub async fn open(axes: &[AxisSetup], period: Duration, options: CyclicOptions) -> Result<Self, GroupError> {
         let network = axes.first().ok_or(GroupError::NoAxis)?.drive.node().network().clone();
         if !PERIODS.contains(&period) {
@@ -57,8 +58,14 @@ impl Group {
         }
         let mut opened = Vec::new();
         for ((number, setup), claim) in (1..).zip(axes).zip(claims) {
-            let drive = setup.open(number, period, options).await?;
-            opened.push(GroupAxis::new(drive, claim));
+            match setup.open(number, period, options).await {
+                Ok(drive) => opened.push(GroupAxis::new(drive, claim)),
+                Err(error) => {
+                    // No group is left that would do it at its end. The first error is the one to report.
+                    let _ = network.put_back(axes.iter().map(|axis| axis.drive.node().id()).collect()).await;
+                    return Err(error);
+                }
+            }
         }
         network.sync(Some(period));
         let limits = axes.iter().map(|axis| axis.limits.clone()).collect();

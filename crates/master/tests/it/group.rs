@@ -476,6 +476,18 @@ fn what_a_group_maps_for_its_cycles_is_put_back_at_its_end() {
     }
 }
 
+/// The second axis is refused when the first is mapped for the cycles already.
+#[test]
+fn a_group_that_cannot_be_opened_leaves_its_drives_as_they_were() {
+    let mut bench = Bench::servos(2);
+    let node = bench.network.node(node(1));
+    let before = block_on(&mut bench.world, pdo_values(&node)).unwrap();
+    // Faster than its drive follows.
+    bench.setups[1].limits.velocity_turns_s = 1e6;
+    assert!(matches!(bench.try_open(), Err(GroupError::BeyondDrive { axis: 2, .. })));
+    assert_eq!(block_on(&mut bench.world, pdo_values(&node)).unwrap(), before);
+}
+
 #[test]
 fn bad_input_is_refused_before_anything_moves() {
     let mut bench = Bench::servos(2);

@@ -204,6 +204,15 @@ fn what_another_master_commands_is_named_as_the_cause() {
         let said = block_on(&mut bench.world, bench.group.explain_stop()).unwrap().unwrap().to_string();
         assert!(causes.iter().all(|cause| said.contains(cause)), "{frame}: {error}: {said}");
     }
+    // A word that keeps it enabled stops nothing, and is not what is named.
+    let mut bench = Bench::moving();
+    let probe = bench.world.add_probe();
+    bench.world.send(probe, "602#2B4060000F000000".parse().unwrap()).unwrap();
+    bench.cycle();
+    bench.world.send(probe, "000#8002".parse().unwrap()).unwrap();
+    let _ = block_on(&mut bench.world, bench.group.rest()).unwrap().unwrap_err();
+    let said = block_on(&mut bench.world, bench.group.explain_stop()).unwrap().unwrap().to_string();
+    assert!(said.contains("commanded by two masters: an NMT command"), "{said}");
     // A shaft that is held was commanded by one master alone.
     let mut bench = Bench::moving();
     bench.world.apply(Place::node(2), &"rotor lock".parse().unwrap()).unwrap().unwrap();
