@@ -137,8 +137,8 @@ pub enum Need {
 }
 
 impl Need {
-    /// What the device has is not asked then.
-    pub(crate) const fn is_a_leave(self) -> bool {
+    /// An option allows it, whatever the device has.
+    pub(crate) const fn is_an_option(self) -> bool {
         matches!(self, Self::Motion | Self::Store)
     }
 

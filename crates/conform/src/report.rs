@@ -14,7 +14,7 @@ pub enum Outcome {
     Expected,
     /// The case says nothing about this device.
     NotApplicable,
-    /// It takes a leave that was not given: to move a motor, or to store parameters.
+    /// It takes an option that was not given: to move a motor, or to store parameters.
     NotRun,
 }
 
@@ -59,7 +59,7 @@ pub struct Summary {
     pub expected: usize,
     /// Nothing was said.
     pub not_applicable: usize,
-    /// Nothing was asked, for want of a leave.
+    /// Nothing was asked, since an option was not given.
     pub not_run: usize,
 }
 

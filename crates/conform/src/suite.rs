@@ -196,7 +196,7 @@ impl Suite {
     async fn absent(&mut self, need: Need) -> (Outcome, String, Vec<String>) {
         let subject = self.bench.subject;
         let (Some(departure), Some(object)) = (stated_absence(&subject, need), need.object()) else {
-            let outcome = if need.is_a_leave() { Outcome::NotRun } else { Outcome::NotApplicable };
+            let outcome = if need.is_an_option() { Outcome::NotRun } else { Outcome::NotApplicable };
             return (outcome, need.to_string(), Vec::new());
         };
         self.bench.begin();

@@ -418,30 +418,17 @@ impl PlannedMove {
     }
 }
 
-/// Has the axes of a group that rests hold until `ended`, which is asked in each cycle with the time since; that time.
+/// Has the axes of a group that rests hold until `ended`, which is asked in each cycle with the time since; that time. Of a group that was
+/// stopped those that follow.
 ///
 /// # Errors
 /// What stopped the group meanwhile.
 pub async fn hold(group: &mut Group, mut ended: impl FnMut(Duration) -> bool) -> Result<Duration, GroupError> {
-    let began = group.network().now();
+    let (began, stopped) = (group.network().now(), group.state().cause);
     loop {
-        group.cycle().await?;
-        group.rest().await?;
-        let held = group.network().now() - began;
-        if ended(held) {
-            return Ok(held);
+        if group.cycle().await?.cause != stopped {
+            group.rest().await?;
         }
-    }
-}
-
-/// The same of a group that an axis has stopped: the others hold where they came to rest.
-///
-/// # Errors
-/// Its cycles have ended.
-pub async fn hold_others(group: &mut Group, mut ended: impl FnMut(Duration) -> bool) -> Result<Duration, GroupError> {
-    let began = group.network().now();
-    loop {
-        group.cycle().await?;
         let held = group.network().now() - began;
         if ended(held) {
             return Ok(held);

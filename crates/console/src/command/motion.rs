@@ -341,9 +341,6 @@ impl Then {
     }
 }
 
-/// Longer than any command runs; as long as a time may be that is typed.
-const YEAR: Duration = Duration::from_secs(365 * 24 * 3600);
-
 /// Reads what came of a motion, and ends it if it is to be ended. `verb` and `value` say what was asked for.
 pub async fn outcome(
     context: &Context,
@@ -368,7 +365,7 @@ pub async fn outcome(
             context.note(&format!(
                 "node {node}: {done}: {reached}; limits: {limits}; until Ctrl-C stops it (or give --for TIME; --no-wait leaves it so)"
             ));
-            Some((YEAR, format!("node {node}: {done}")))
+            Some((Duration::MAX, format!("node {node}: {done}")))
         }
         Then::GoesOn | Then::Stands => None,
     };

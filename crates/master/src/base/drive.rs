@@ -407,12 +407,7 @@ impl Base {
         };
         let [left, right] = &self.drives;
         let drive = if left.node().id() == node { left } else { right }.clone();
-        Some(async move {
-            match refusal {
-                Some(refusal) => drive.explain_refusal(refusal).await,
-                None => drive.explain_overruled().await,
-            }
-        })
+        Some(drive.explain_stop(refusal))
     }
 
     fn lost_wheel(&self) -> Option<StopCause> {

@@ -56,7 +56,7 @@ pub struct OtherWrite {
     pub at: Instant,
     /// The object.
     pub object: Mux,
-    /// The value, where it came in the request, with 0 for bytes that are not there.
+    /// The value, where it came in the request.
     pub value: Option<u32>,
 }
 

@@ -37,7 +37,7 @@ impl Core {
 
     /// Another client asks a node: what it writes to the device profile may be why a motion of this program ends.
     pub(super) fn handle_other_request(&mut self, node: NodeId, frame: &Frame) {
-        /// Of standardised devices (CiA 301, table 36).
+        /// The areas of standardised device profiles (CiA 301, 7.4).
         const DEVICE_PROFILE: Range<u16> = 0x6000..0xA000;
         let at = self.now;
         let member = self.member_mut(node);
@@ -46,7 +46,11 @@ impl Core {
             && DEVICE_PROFILE.contains(&object.index)
         {
             let value = match payload {
-                Payload::Expedited { bytes, .. } => Some(u32::from_le_bytes(bytes)),
+                Payload::Expedited { length, mut bytes } => {
+                    // Bytes beyond the length mean nothing.
+                    bytes.iter_mut().skip(length.unwrap_or(u8::MAX).into()).for_each(|byte| *byte = 0);
+                    Some(u32::from_le_bytes(bytes))
+                }
                 Payload::Segmented { .. } => None,
             };
             member.facts.other_write = Some(OtherWrite { at, object, value });

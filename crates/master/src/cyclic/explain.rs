@@ -29,11 +29,20 @@ impl Drive {
         Some(self.not_reached(INTENT, trigger).await)
     }
 
+    /// What stopped a group or a base by this drive: what it refused, or, of a shaft that only lags, what another master commanded.
+    pub(crate) async fn explain_stop(self, refusal: Option<Refusal>) -> Option<Error> {
+        match refusal {
+            Some(refusal) => self.explain_refusal(refusal).await,
+            None => self.explain_overruled().await,
+        }
+    }
+
     /// What another master was seen to command, where that may be why a shaft does not follow or a TPDO stays away: another NMT state, or
     /// a value of an object of the device profile. `None` where nothing of it was seen.
     pub async fn explain_overruled(&self) -> Option<Error> {
         let (seen, now) = (self.node().facts(), self.node().network().now());
         let state = seen.probable_state(self.description());
+        // This program's own commands are among these.
         let is_commanded =
             seen.nmt_sent.is_some_and(|(at, command)| command != NmtCommand::Start && now - at <= LATELY);
         let is_away = is_commanded && state.is_some_and(|state| state != NmtState::Operational);

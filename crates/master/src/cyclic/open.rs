@@ -255,11 +255,13 @@ impl Drive {
         let Some(mapped) = self.pdos_of_cycle(mode, position)? else { return Ok(()) };
         let units = TimerUnits::of(description);
         for pdo in pdos_of(description) {
-            let (config, cob_id) = node.pdo_config(pdo, units).await?;
             let own = mapped.iter().find(|own| own.pdo == pdo);
-            let others = pdo.direction == Direction::Tpdo && pdo.number.position() >= description.axes.len();
-            let is_off = !others || !cob_id.is_valid() || config.map.0.is_empty();
-            if own.is_none() && is_off {
+            let takes_room = pdo.direction == Direction::Tpdo && pdo.number.position() >= description.axes.len();
+            if own.is_none() && !takes_room {
+                continue;
+            }
+            let (config, cob_id) = node.pdo_config(pdo, units).await?;
+            if own.is_none() && (!cob_id.is_valid() || config.map.0.is_empty()) {
                 continue;
             }
             if former {

@@ -62,8 +62,8 @@ pub(crate) enum Interference {
     Unknown,
 }
 
-/// What follows from the facts, and what to do.
-pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> (String, String) {
+/// What follows from the facts, and what to do; `controlword` is that of the axis.
+pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle, controlword: Mux) -> (String, String) {
     let seen = facts.iter().find_map(|fact| if let Fact::Statusword(_, state) = fact { Some(*state) } else { None });
     let state = seen.flatten();
     let faults = facts.iter().find_map(|fact| match fact {
@@ -81,7 +81,7 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
     if let Some((code, rows)) = faults.filter(|_| at_fault || style != PowerStyle::Cia402) {
         return faulted(code, rows);
     }
-    let by = overruled(trigger, facts);
+    let by = overruled(trigger, facts, controlword);
     match (trigger, state) {
         (_, Some(PowerState::Fault | PowerState::FaultReactionActive)) => text(
             "The drive is at fault and gives no fault code",
@@ -105,7 +105,7 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
             )
         }
         (Trigger::Overruled, Some(_)) => (
-            format!("It is commanded by two masters: {}", by.as_deref().unwrap_or("another one stopped it")),
+            format!("It was commanded otherwise: {}", by.as_deref().unwrap_or("by another master")),
             "Find out who else commands it: another master, a PLC, a pendant. When it is safe, start the motion again"
                 .to_owned(),
         ),
@@ -118,20 +118,16 @@ pub(super) fn conclude(trigger: &Trigger, facts: &[Fact], style: PowerStyle) -> 
 }
 
 /// Who commands it otherwise, as far as that was seen on the bus.
-fn overruled(trigger: &Trigger, facts: &[Fact]) -> Option<String> {
+fn overruled(trigger: &Trigger, facts: &[Fact], controlword: Mux) -> Option<String> {
     let is_overruled = matches!(trigger, Trigger::Overruled);
     let of = |fact: &Fact| match fact {
         // Other motions need no operational node.
         Fact::Nmt(state) if is_overruled && *state != NmtState::Operational => {
-            Some(format!("an NMT command of another master has taken its node to {state}, where no PDO comes or goes"))
+            Some(format!("an NMT command has taken its node to {state}, where no PDO comes or goes"))
         }
         // One that keeps it enabled stops nothing.
-        Fact::OtherWrite(_, object, Some(value))
-            if object.index & AXIS_OBJECT == CONTROLWORD && value & (0x0F | HALT) == 0x0F =>
-        {
-            None
-        }
-        Fact::OtherWrite(age, object, value) if is_overruled || object.index & AXIS_OBJECT == CONTROLWORD => {
+        Fact::OtherWrite(_, object, Some(value)) if *object == controlword && value & (0x0F | HALT) == 0x0F => None,
+        Fact::OtherWrite(age, object, value) if is_overruled || *object == controlword => {
             let value = value.map_or(String::new(), |value| format!(" {value:X}h"));
             Some(format!("another master wrote{value} to {object} {:.1} s before", age.as_secs_f64()))
         }
@@ -140,10 +136,6 @@ fn overruled(trigger: &Trigger, facts: &[Fact]) -> Option<String> {
     facts.iter().find_map(of)
 }
 
-/// The place of an object among those of its axis, which lie 800h apart (CiA 402-2, 5.4).
-const AXIS_OBJECT: u16 = 0x07FF;
-/// That of 6040h.
-const CONTROLWORD: u16 = 0x6040 & AXIS_OBJECT;
 /// Bit 8 of a controlword.
 const HALT: u32 = Controlword::HALT as u32;
 

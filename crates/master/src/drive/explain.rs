@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use cia402::ModeOfOperation;
-use cia402::object::MODES_OF_OPERATION;
+use cia402::object::{CONTROLWORD, MODES_OF_OPERATION};
 use devices::Description;
 use devices::faults::FaultRow;
 
@@ -48,7 +48,7 @@ impl Drive {
             }
         }
         self.recall(&mut facts);
-        let (mut conclusion, mut advice) = conclude(&trigger, &facts, self.power_style());
+        let (mut conclusion, mut advice) = conclude(&trigger, &facts, self.power_style(), self.place(CONTROLWORD));
         match self.hindrance(&trigger, &facts).await {
             Some(cause) => {
                 if let Trigger::Elsewhere { at, target, unit, .. } = trigger {

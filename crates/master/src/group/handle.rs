@@ -377,12 +377,7 @@ impl Group {
             _ => return None,
         };
         let drive = self.drives.get(axis.checked_sub(1)?)?.clone();
-        Some(async move {
-            match refusal {
-                Some(refusal) => drive.explain_refusal(refusal).await,
-                None => drive.explain_overruled().await,
-            }
-        })
+        Some(drive.explain_stop(refusal))
     }
 
     /// A stop that was asked for does not outlast the next command.

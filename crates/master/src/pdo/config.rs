@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use canopen::{CobId, Mux};
+use canopen::Mux;
 use devices::Description;
 
 use crate::core::PdoMap;
@@ -119,17 +119,4 @@ impl PdoConfig {
     pub(super) const fn mapping(&self, sub_index: u8) -> Mux {
         Mux::new(self.pdo.mapping_index(), sub_index)
     }
-}
-
-/// A PDO before a motion for which it is set up otherwise.
-#[derive(Clone, Debug)]
-pub(crate) struct FormerPdo {
-    pub config: PdoConfig,
-    /// Invalid where it was switched off.
-    pub cob_id: CobId,
-    pub units: TimerUnits,
-    /// Entries of its mapping behind the last object, which carry nothing.
-    pub behind: Vec<u32>,
-    /// This master sent or received it.
-    pub was_used: bool,
 }

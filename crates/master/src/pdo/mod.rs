@@ -9,6 +9,7 @@ mod all;
 mod config;
 mod error;
 mod foreseen;
+mod former;
 mod node;
 mod signal;
 mod silence;
@@ -16,8 +17,8 @@ mod transaction;
 mod values;
 mod when;
 
-pub(crate) use config::FormerPdo;
 pub use config::{PdoConfig, TimerUnits, TransmissionType};
 pub use error::{PdoError, SignalError};
+pub(crate) use former::FormerPdo;
 pub use silence::{Silence, Situation, why_silent};
 pub use values::{PdoUnfit, most_objects, record_of, values_off};

@@ -2,9 +2,10 @@
 
 use canopen::{AbortCode, CobId, Mux};
 
-use super::config::{FormerPdo, PdoConfig, TimerUnits};
+use super::config::{PdoConfig, TimerUnits};
 use super::error::PdoError;
-use super::transaction::{apply, put_back, read};
+use super::former::FormerPdo;
+use super::transaction::{apply, put_back, read, way_back};
 use crate::core::RpdoTrigger;
 use crate::error::Error;
 use crate::network::Node;
@@ -12,27 +13,20 @@ use can::{CanId, Frame};
 use canopen::pdo::{Direction, PdoId, PdoNumber};
 
 impl Node {
-    /// Has a PDO put back when the guard of the drive is given back, since it is going to be set up for a motion alone, with so many objects
-    /// at most. An entry that a device does not have is left out.
+    /// Has a PDO put back when the guard of the drive is given back, since it is going to be set up for a motion alone, with so many `objects`
+    /// at most.
     ///
     /// # Errors
-    /// Those of the SDO reads.
+    /// [`PdoError`], before anything has changed.
     pub(crate) async fn note_former_pdo(
         &self,
         (config, cob_id): (PdoConfig, CobId),
         objects: u8,
         units: TimerUnits,
-    ) -> Result<(), Error> {
-        let mut behind = Vec::new();
-        for sub_index in config.map.0.len() as u8 + 1..=objects {
-            match self.upload(config.mapping(sub_index)).await {
-                Ok(record) => behind.push(record.raw()),
-                Err(Error::Aborted { .. }) => break,
-                Err(error) => return Err(error),
-            }
-        }
+    ) -> Result<(), PdoError> {
+        let before = way_back(self, (&config, cob_id), objects, units).await?;
         let was_used = self.uses_pdo(config.pdo);
-        self.network().note_former_pdo(self.id(), FormerPdo { config, cob_id, units, behind, was_used });
+        self.network().note_former_pdo(self.id(), FormerPdo { config, before, was_used });
         Ok(())
     }
 
@@ -43,12 +37,11 @@ impl Node {
 
     /// Puts it back.
     pub(crate) async fn put_back_pdo(&self, former: &FormerPdo) -> Result<(), Error> {
-        let FormerPdo { config, cob_id, was_used, .. } = former;
         // Not by the mapping of the motion any more, whatever becomes of it.
-        self.forget_pdo(config.pdo);
+        self.forget_pdo(former.config.pdo);
         put_back(self, former).await?;
-        if *was_used {
-            self.use_pdo(config, *cob_id);
+        if former.was_used {
+            self.use_pdo(&former.config, former.before.cob_id);
         }
         Ok(())
     }

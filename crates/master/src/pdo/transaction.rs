@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use canopen::{AbortCode, CobId, Mux};
 
-use super::config::{FormerPdo, PdoConfig, TimerUnits, TransmissionType};
+use super::config::{PdoConfig, TimerUnits, TransmissionType};
 use super::error::PdoError;
+use super::former::{Before, FormerPdo, NamedWrite};
 use crate::core::PdoMap;
 use crate::error::Error;
 use crate::network::Node;
@@ -14,21 +15,6 @@ use canopen::pdo::{AddressMode, MappingRecord, PdoId};
 
 /// Most objects in one PDO. Source: CiA 301, 7.5.2.36.
 const MAX_OBJECTS: usize = 64;
-
-/// One write with its name for people.
-#[derive(Clone, Copy, Debug)]
-struct NamedWrite {
-    step: &'static str,
-    mux: Mux,
-    raw: u32,
-    bytes: usize,
-}
-
-/// What a PDO was before, to go back to.
-struct Before {
-    cob_id: CobId,
-    writes: Vec<NamedWrite>,
-}
 
 enum WriteTrouble {
     Failed(&'static str, Error),
@@ -60,18 +46,32 @@ pub(super) async fn apply(node: &Node, config: &PdoConfig, units: TimerUnits) ->
     }
 }
 
-/// Sets a PDO up as it was [read](read), switched off if it was.
+/// The way back to a PDO as it was [read](read), with the entries of its mapping behind the last object, up to so many `objects`: they carry
+/// nothing, and another mapping writes over them. An entry that a device does not have is left out.
+pub(super) async fn way_back(
+    node: &Node,
+    (config, cob_id): (&PdoConfig, CobId),
+    objects: u8,
+    units: TimerUnits,
+) -> Result<Before, PdoError> {
+    let mut writes = plan(node, config, units)?;
+    for sub_index in config.map.0.len() as u8 + 1..=objects {
+        let (step, mux) = ("put back an entry behind the last object", config.mapping(sub_index));
+        match cell(node, mux).await {
+            Ok(raw) => writes.insert(sub_index.into(), NamedWrite { step, mux, raw, bytes: 4 }),
+            Err(Error::Aborted { .. }) => break,
+            Err(cause) => {
+                let (node, step) = (node.id(), "read what is there");
+                return Err(PdoError::Step { node, pdo: config.pdo, step, cause, restored: true });
+            }
+        }
+    }
+    Ok(Before { cob_id, writes })
+}
+
+/// Sets a PDO up as it was, switched off if it was.
 pub(super) async fn put_back(node: &Node, former: &FormerPdo) -> Result<(), Error> {
-    let FormerPdo { config, cob_id, units, behind, .. } = former;
-    // What a device has is no longer than a PDO.
-    let Ok(mut writes) = plan(node, config, *units) else { return Ok(()) };
-    let mapped = config.map.0.len() + 1;
-    let behind = (mapped..).zip(behind).map(|(sub_index, raw)| {
-        let mux = config.mapping(sub_index as u8);
-        NamedWrite { step: "put back an entry behind the last object", mux, raw: *raw, bytes: 4 }
-    });
-    writes.splice(mapped..mapped, behind.collect::<Vec<_>>());
-    restore(node, config, &Before { cob_id: *cob_id, writes }).await.map_err(|trouble| match trouble {
+    restore(node, &former.config, &former.before).await.map_err(|trouble| match trouble {
         WriteTrouble::Failed(_, cause) => cause,
         WriteTrouble::Differs(NamedWrite { mux, raw: had, .. }, found) => {
             Error::NotPutBack { node: node.id(), mux, had, found }

@@ -188,13 +188,13 @@ fn what_another_master_commands_is_named_as_the_cause() {
         // Max torque: it lags behind.
         (
             "602#2B72600000000000",
-            [
-                "It is commanded by two masters: another master wrote 0h to 6072h:00",
-                "6072h:00 written by another master",
-            ],
+            ["It was commanded otherwise: another master wrote 0h to 6072h:00", "6072h:00 written by another master"],
         ),
         // NMT enter pre-operational: its TPDO stays away.
-        ("000#8002", ["an NMT command of another master has taken its node to pre-operational", "no PDO comes"]),
+        (
+            "000#8002",
+            ["It was commanded otherwise: an NMT command has taken its node to pre-operational", "no PDO comes"],
+        ),
     ] {
         let mut bench = Bench::moving();
         let probe = bench.world.add_probe();
@@ -212,7 +212,7 @@ fn what_another_master_commands_is_named_as_the_cause() {
     bench.world.send(probe, "000#8002".parse().unwrap()).unwrap();
     let _ = block_on(&mut bench.world, bench.group.rest()).unwrap().unwrap_err();
     let said = block_on(&mut bench.world, bench.group.explain_stop()).unwrap().unwrap().to_string();
-    assert!(said.contains("commanded by two masters: an NMT command"), "{said}");
+    assert!(said.contains("It was commanded otherwise: an NMT command"), "{said}");
     // A shaft that is held was commanded by one master alone.
     let mut bench = Bench::moving();
     bench.world.apply(Place::node(2), &"rotor lock".parse().unwrap()).unwrap().unwrap();

@@ -9,10 +9,9 @@ use canopen::NodeId;
 use cia402::ModeOfOperation;
 use host::group_follow::{GroupFollow, PlannedFollow, RecordedPath};
 use machine::file::GroupPlan;
-use machine::group_move::{
-    GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, hold_others, rate, target, turning,
-};
+use machine::group_move::{GroupMove, GroupRun, PULLING_LOAD, PlannedMove, angle, hold, rate, target, turning};
 use master::Drive;
+use master::cyclic::CyclicState;
 use master::group::{AxisLimits, AxisSetup, Group, GroupError, Phase, StopCause};
 use master::units::{Along, Angle, Rpm, Shown, parse_duration};
 use serde::Serialize;
@@ -411,7 +410,7 @@ impl GroupOptions {
                 Planned::Follow(planned) => planned.carry_out(group, progress).await?,
             };
             let held = match self.hold {
-                Some(time) => Some(keep(context, group, time).await?),
+                Some(time) => Some(keep(context, group, time, &format!("{axes} axes hold")).await?),
                 None => None,
             };
             Ok::<_, GroupError>((run, held))
@@ -428,62 +427,43 @@ impl GroupOptions {
                     Some(StopCause::Axis { refusal, .. }) if is_late => self.cycles.advised(failure, refusal),
                     _ => failure,
                 };
-                if let (Some(time), Some(StopCause::Axis { .. })) = (self.hold, cause) {
-                    keep_others(context, group, time, &failure.what).await?;
-                }
-                Err(failure)
+                let Some(time) = self.hold.filter(|_| has_others(group)) else { return Err(failure) };
+                let who = format!("{}. The other axes hold", failure.what);
+                Err(keep(context, group, time, &who).await.err().into_iter().fold(failure, Failure::because))
             }
         }
     }
 }
 
-/// After an axis has stopped the group: those that follow hold on as they were to hold at the end, and do not fall with it.
-async fn keep_others(
-    context: &Context,
-    group: &mut Group,
-    time: Option<Duration>,
-    what: &str,
-) -> Result<(), GroupError> {
-    if group.state().phase != Phase::Holding || group.axes().iter().all(|axis| !axis.follows) {
-        return Ok(());
-    }
-    let Some(time) = time else {
-        context.note(&format!(
-            "{what}. The other axes hold; the end of standard input (Ctrl-D) takes their power, {POWER}: {PULLING_LOAD}"
-        ));
-        let input = end_of_input();
-        return hold_others(group, |_| input.load(Ordering::Relaxed)).await.map(|_| ());
-    };
-    let time_s = Shown(time.as_secs_f64());
-    context.note(&format!("{what}. The other axes hold for {time_s} s, then their power is taken; {POWER}"));
-    hold_others(group, |held| held >= time).await.map(|_| ())
+/// After a drive has stopped the group the others hold on, as they were to at the end, and do not fall with it. Not where an axis was pushed
+/// away: it would press on.
+fn has_others(group: &Group) -> bool {
+    let state = group.state();
+    matches!(state.cause, Some(StopCause::Axis { .. }))
+        && state.phase == Phase::Holding
+        && group.axes().iter().any(|axis| axis.follows)
 }
 
 /// Of a group that is about to be closed: of which axes that takes the power; `None` where none has any.
 fn power_taken(group: &Group) -> Option<String> {
-    let nodes = |is_live: bool| {
-        let axes = group.drives().iter().zip(group.axes()).filter(|(_, axis)| axis.is_live == is_live);
+    let nodes = |is_meant: fn(&CyclicState) -> bool| {
+        let axes = group.drives().iter().zip(group.axes()).filter(|(_, axis)| is_meant(axis));
         axes.map(|(drive, _)| format!("node {}", drive.node().id())).collect::<Vec<_>>().join(", ")
     };
-    let (powered, without) = (nodes(true), nodes(false));
+    let (powered, without) = (nodes(|axis| axis.is_live), nodes(CyclicState::is_without_power));
     let before = if without.is_empty() { String::new() } else { format!("{without} had lost its power, and ") };
     (!powered.is_empty()).then(|| format!("{before}the power of {powered} was taken at the end: {PULLING_LOAD}"))
 }
 
-/// How long a signal leaves them so.
-const POWER: &str = "Ctrl-C quick-stops the drives";
-
-/// Holds for so long, or until standard input ends.
-async fn keep(context: &Context, group: &mut Group, time: Option<Duration>) -> Result<Duration, GroupError> {
-    let axes = group.axes().len();
+/// Holds for so long, or until standard input ends; `who` does, in words.
+async fn keep(context: &Context, group: &mut Group, time: Option<Duration>, who: &str) -> Result<Duration, GroupError> {
+    const POWER: &str = "Ctrl-C quick-stops the drives";
     let Some(time) = time else {
-        context.note(&format!(
-            "{axes} axes hold; the end of standard input (Ctrl-D) takes their power, {POWER}: {PULLING_LOAD}"
-        ));
+        context.note(&format!("{who}; the end of standard input (Ctrl-D) takes their power, {POWER}: {PULLING_LOAD}"));
         let input = end_of_input();
         return hold(group, |_| input.load(Ordering::Relaxed)).await;
     };
-    context.note(&format!("{axes} axes hold for {} s, then their power is taken; {POWER}", Shown(time.as_secs_f64())));
+    context.note(&format!("{who} for {} s, then their power is taken; {POWER}", Shown(time.as_secs_f64())));
     hold(group, |held| held >= time).await
 }
 

@@ -80,9 +80,9 @@ impl Conform {
 
     /// What is asked of a page a year later.
     fn circumstances(&self, global: &Global) -> [(&'static str, String); 3] {
-        let leave =
+        let given =
             |option: &str, is_given: bool| format!("{option}: {}", if is_given { "given" } else { "not given" });
-        let mut options = vec![leave("--allow-motion", self.allow_motion), leave("--allow-store", self.allow_store)];
+        let mut options = vec![given("--allow-motion", self.allow_motion), given("--allow-store", self.allow_store)];
         for (option, cases) in [("--only", &self.only), ("--skip", &self.skip)] {
             options.extend((!cases.is_empty()).then(|| format!("{option} {}", cases.join(","))));
         }
