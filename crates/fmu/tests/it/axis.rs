@@ -92,6 +92,8 @@ struct Program {
     network: Network,
     wheel: CyclicDrive,
     off_since: Option<Instant>,
+    /// Until SYNC has begun.
+    period: Option<Duration>,
 }
 
 const ENABLED: u64 = 1_700;
@@ -115,13 +117,16 @@ impl Program {
             drive.cyclic(ModeOfOperation::PROFILE_VELOCITY, CyclicOptions::default()).await.unwrap()
         });
         let wheel = opened.unwrap();
-        network.sync(Some(Duration::from_millis(2)));
-        Self { world, network, wheel, off_since: None }
+        Self { world, network, wheel, off_since: None, period: Some(Duration::from_millis(2)) }
     }
 
     fn run_to(&mut self, ms: u64) {
-        let Self { world, network, wheel, off_since } = self;
+        let Self { world, network, wheel, off_since, period } = self;
         let cycles = async {
+            // Here, and not when it was opened: the first SYNC would pass before anything waits for it.
+            if let Some(period) = period.take() {
+                network.sync(Some(period));
+            }
             loop {
                 network.next_sync().await.unwrap();
                 network.exchange(|io| {

@@ -23,6 +23,8 @@ use sim::machine::{Order, order};
 use sim::{Place, StationId, Stimulus, World, block_on, block_on_for};
 use words::failure::Failure;
 
+#[path = "../../../master/tests/it/stopping/page.rs"]
+mod page;
 #[path = "../../../master/tests/it/stopping/process.rs"]
 mod process;
 use process::Process;
@@ -306,17 +308,9 @@ fn a_test_motion_and_a_tuning_stop_within_their_ramp_however_they_end() {
             lines.push(format!("| {} | {name} | {} |", what.words(), ENDS.map(cell).join(" | ")));
         }
     }
-    let page = std::fs::read_to_string(PAGE).unwrap();
-    let (before, rest) = page.split_once(TABLE_BEGINS).expect("the page has the table");
-    let (_, after) = rest.split_once("\n\n").expect("something follows it");
-    let made = format!("{before}{}\n\n{after}", lines.join("\n"));
-    if std::env::var_os("FERRODRIVE_WRITE_PAGES").is_some() {
-        std::fs::write(PAGE, &made).unwrap();
-    }
-    assert_eq!(page, made, "docs/safety.md says how its tables are made");
+    page::compare(TABLE_BEGINS, &lines.join("\n"));
 }
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/safety.md");
 const TABLE_BEGINS: &str = "| motion with captures | drive |";
 
 #[test]
