@@ -43,7 +43,7 @@ use clap_complete::env::CompleteEnv;
 
 use crate::args::{Cli, Command};
 use crate::command::look::departures::DepartureList;
-use crate::command::look::objects::{Objects, Whose};
+use crate::command::look::objects::{ModelList, Objects, Whose};
 use crate::command::network::check::Check;
 use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
@@ -325,12 +325,13 @@ fn check(global: &Global, format: Format, check: &Check) -> Result<(), Failure> 
 
 fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<(), Failure> {
     match objects.whose {
-        Whose::Model(model) if objects.departures => print(format, &DepartureList::of(model, None)),
-        Whose::Node(node) if objects.departures => {
+        None => print(format, &ModelList::new()),
+        Some(Whose::Model(model)) if objects.departures => print(format, &DepartureList::of(model, None)),
+        Some(Whose::Node(node)) if objects.departures => {
             on_bus(global, format, async |context| objects.departures_of_node(context, node).await)
         }
-        Whose::Model(model) => print(format, &objects.list(model)?),
-        Whose::Node(node) => on_bus(global, format, async |context| objects.of_node(context, node).await),
+        Some(Whose::Model(model)) => print(format, &objects.list(model)?),
+        Some(Whose::Node(node)) => on_bus(global, format, async |context| objects.of_node(context, node).await),
     }
 }
 

@@ -186,7 +186,7 @@ pub(crate) fn heeds_machine(command: &str) -> bool {
 pub(crate) fn refuse_unheeded(global: &Global, command: &Command, matches: &ArgMatches) -> Result<(), Failure> {
     let typed = |option: &str| matches.value_source(option) == Some(ValueSource::CommandLine);
     let own_bus = matches!(global.bus, BusSpec::Sim { .. });
-    let of_model = matches!(command, Command::Objects(objects) if matches!(objects.whose, Whose::Model(_)));
+    let of_model = matches!(command, Command::Objects(objects) if !matches!(objects.whose, Some(Whose::Node(_))));
     let name = matches.subcommand_name().unwrap_or_default();
     let of_file = matches!(command, Command::Check(_)) && global.bus == BusSpec::Sim { file: None };
     let of_drives = matches!(command, Command::Init(init) if init.is_without_bus());

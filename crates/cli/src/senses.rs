@@ -56,6 +56,7 @@ const LOOKING: &[Sense] = &[
         words: &["list", "ls", "devices", "discover", "nodes", "node list", "search", "ping", "who", "bus"],
         tips: &["scan"],
     },
+    Sense { words: &["models", "model", "drives", "supported", "catalog", "catalogue"], tips: &["objects"] },
     Sense { words: &["info", "identify", "id", "describe", "node info"], tips: &["scan", "state 4"] },
     Sense { words: &["mode", "modes", "opmode", "set-mode"], tips: &["state 4", "write --help"] },
     Sense { words: &["accel", "acceleration", "ramp", "ramps"], tips: &["objects 4 acceleration"] },

@@ -53,7 +53,9 @@ pub(crate) fn further(command: &Command, words: &[String], error: ErrorKind) -> 
         return None;
     }
     let at = words.iter().position(|word| command.find_subcommand(word).is_some())?;
-    let node = (at + 2..words.len()).find(|place| nodes(&words[*place]).is_ok())?;
+    // A number behind an option is its value.
+    let is_node = |place: &usize| nodes(&words[*place]).is_ok() && !words[*place - 1].starts_with('-');
+    let node = (at + 2..words.len()).find(is_node)?;
     let order = node_behind(words, at, node);
     let line = std::iter::once("ferrodrive").chain(order.iter().map(String::as_str));
     let further = command.clone().try_get_matches_from(line).err()?;
@@ -97,6 +99,7 @@ mod tests {
         let further = |line: &str| further(&command_line(), &words(line), ErrorKind::ValueValidation);
         let error = further("nmt fly 4").map(|error| error.to_string()).unwrap_or_default();
         assert!(error.contains("'fly'") && error.contains("pre-operational"), "{error}");
+        assert!(further("run a.toml --seeds 20").is_none());
         assert!(further("nmt 4 start").is_none() && further("move 90deg 4").is_none());
     }
 }

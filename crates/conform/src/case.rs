@@ -51,7 +51,7 @@ pub enum Group {
 }
 
 impl Group {
-    const ALL: [(Self, &'static str, &'static str); 13] = [
+    pub(crate) const ALL: [(Self, &'static str, &'static str); 13] = [
         (Self::Sdo, "SDO", "service data objects"),
         (Self::Pdo, "PDO", "process data objects"),
         (Self::Dictionary, "OD", "object dictionary"),

@@ -9,7 +9,7 @@ use master::Network;
 
 use crate::bench::{Bench, Restorer, SILENCE, refused};
 use crate::capture::Capture;
-use crate::case::{Case, Need};
+use crate::case::{Case, Group, Need};
 use crate::cases;
 use crate::finding::{Finding, Verdict, fail};
 use crate::options::Options;
@@ -30,7 +30,10 @@ pub enum SuiteError {
 impl std::fmt::Display for SuiteError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Unknown(name) => write!(f, "expected a case such as 'SDO 07' or a group such as SDO, got '{name}'"),
+            Self::Unknown(name) => {
+                let groups = Group::ALL.map(|(_, prefix, _)| prefix).join(", ");
+                write!(f, "expected a case such as 'SDO 07' or a group ({groups}), got '{name}'")
+            }
             Self::NoAnswer(waited) => {
                 write!(f, "the node does not answer: 1000h was read, nothing came within {} ms", waited.as_millis())
             }

@@ -52,6 +52,16 @@ pub const fn standard_object(index: u16) -> Option<Name> {
     }
 }
 
+/// The object of the standard with this name to type, where one alone has it.
+pub fn by_name(name: &str) -> Option<Mux> {
+    let whole = OBJECTS.iter().filter(|object| object.parts.is_empty()).map(|object| Mux::new(object.index, 0));
+    let parts = |object: &'static Object| object.parts.iter().map(|(sub_index, _)| Mux::new(object.index, *sub_index));
+    let all = whole.chain(OBJECTS.iter().flat_map(parts));
+    let mut found = all.filter(|mux| standard(*mux).is_some_and(|its| its.name == name));
+    let first = found.next();
+    first.filter(|_| found.next().is_none())
+}
+
 /// True if an object that is called `name` was called `former` in an earlier version.
 ///
 /// Two makers' objects may have had one name: look in the table of one model, and for its present names first.

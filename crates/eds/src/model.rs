@@ -405,6 +405,16 @@ impl Hash for Variable {
     }
 }
 
+impl Variable {
+    /// What it is to have: the value of a DCF, else what it is delivered with.
+    pub const fn value_or_default(&self) -> Option<&Value> {
+        match &self.value {
+            Some(value) => Some(value),
+            None => self.default.as_ref(),
+        }
+    }
+}
+
 impl Eds {
     /// True for a modular device, or with sections about its modules (CiA 306-1, clause 4.7). Their objects are not among
     /// [`objects`](Self::objects).

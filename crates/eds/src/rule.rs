@@ -312,4 +312,21 @@ rules! {
         "A CAN frame has eight bytes. A device refuses the count (0604 0042h), or the file describes another \
         device.",
         "ParameterName=Mapped objects\nDataType=5\nAccessType=rw\nDefaultValue=3" => "ParameterName=Mapped objects\nDataType=5\nAccessType=rw\nDefaultValue=2";
+    /// Who the device is, said twice.
+    DeviceIdentity = 406, Warning, "a number of the device that is not the one of its identity object", "as it stands",
+        "CiA 306-1, general device information; CiA 301, 7.5.2.19",
+        "Tools that find the file of a device look for the numbers of `[DeviceInfo]`, masters compare the device with 1018h: one \
+        of them takes the device for another.",
+        "VendorNumber=0x101" => "VendorNumber=0x100";
+    /// How many PDOs there are, said twice.
+    PdoCount = 407, Warning, "another number of PDOs than are described", "those that are described",
+        "CiA 306-1, general device information (NrOfRXPDO, NrOfTXPDO)",
+        "A tool that goes by the number offers PDOs that are not there, or does not show some that are.",
+        "NrOfTXPDO=4" => "NrOfTXPDO=1";
+    /// One identifier for two things.
+    SharedIdentifier = 408, Warning, "one identifier for two messages that the device sends, or for two that it takes", "as it stands",
+        "CiA 301, 7.3.3",
+        "Who receives the identifier cannot tell which of the two it is; an RPDO that shares one is written by the frames of the \
+        other.",
+        "ParameterName=COB-ID\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x80" => "ParameterName=COB-ID\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x180";
 }

@@ -134,6 +134,7 @@ impl LoadGear {
             mesh_loss: 0.0,
             output_coulomb_nm: 0.0,
             kinematic_error_rad: 0.0,
+            rated_nm: f64::MAX,
             peak_nm: f64::MAX,
             ratchet_nm: f64::MAX,
         }

@@ -61,6 +61,8 @@ pub struct GearModel {
     pub output_coulomb_nm: f64,
     /// Amplitude of the kinematic error, at the output.
     pub kinematic_error_rad: f64,
+    /// Torque that it may transmit all the time.
+    pub rated_nm: f64,
     /// Torque that it may transmit for moments; more is counted as an overload.
     pub peak_nm: f64,
     /// Torque from which its teeth jump.

@@ -268,6 +268,7 @@ const fn joint(name: &'static str, motor: Motor, reducer: Reducer) -> JointMotor
             mesh_loss: ratio * (motor.torque_nm - lost_before_teeth_nm) / (output_nm + output_dry_nm) - 1.0,
             output_coulomb_nm: output_dry_nm,
             kinematic_error_rad: reducer.error_rad,
+            rated_nm: output_nm,
             peak_nm: reducer.peak_nm,
             ratchet_nm: reducer.ratchet_nm,
         },

@@ -64,6 +64,9 @@ def test_an_axis_without_a_mode_has_the_best_of_its_model(model, mode):
             group.move([at + 20], within=2)
             network.sleep(0.3)
             assert math.degrees(world[5].shaft_angle_rad - before) == pytest.approx(20, abs=2)
+            axis = group.state()["axes"][0]
+            error = abs(axis["angle_deg"] - axis["set_point_deg"])
+            assert axis["following_error_deg"] == pytest.approx(error) and error < 2
 
 
 def test_axes_behind_gears_are_moved_by_what_the_outputs_do(world, network):

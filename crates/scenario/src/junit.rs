@@ -1,10 +1,12 @@
-//! Outcomes in JUnit's XML, which build servers read: a test suite for each scenario, a test case for each row.
+//! Outcomes in JUnit's XML, which build servers read: a test suite for each scenario, a test case for each row; of a sweep a test case
+//! for each run.
 
 use std::fmt::{self, Write};
 
 use words::escaped;
 
 use super::outcome::{Outcome, Row, Verdict};
+use super::sweep::results::RunResult;
 
 /// A file of test suites: of each scenario the outcome of its run under its title, or under its name why it could not be run.
 pub fn junit<'a>(scenarios: impl IntoIterator<Item = (impl AsRef<str>, Result<&'a Outcome, String>)>) -> String {
@@ -53,6 +55,26 @@ fn case(xml: &mut String, title: &str, row: &Row, outcome: &Outcome) -> fmt::Res
         Verdict::Failed => writeln!(xml, "><failure message=\"{seen}\"/></testcase>"),
         Verdict::Skipped => writeln!(xml, "><skipped message=\"{seen}\"/></testcase>"),
     }
+}
+
+/// The suite of a sweep, of its test cases, some of which failed.
+pub(crate) fn suite_of_runs(title: &str, (runs, failed): (u64, u64), cases: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n  <testsuite name=\"{}\" tests=\"{runs}\" failures=\"{failed}\" \
+         skipped=\"0\">\n{cases}  </testsuite>\n</testsuites>\n",
+        escaped(title)
+    )
+}
+
+/// A run of a sweep: the options that repeat it, and what was asked first that was not so.
+pub(crate) fn case_of_run(title: &str, options: &str, result: &RunResult) -> String {
+    let time = result.end_s.unwrap_or_default();
+    let case = format!("    <testcase classname=\"{}\" name=\"{}\" time=\"{time}\"", escaped(title), escaped(options));
+    if result.passed {
+        return format!("{case}/>\n");
+    }
+    let [asked, seen] = [&result.asked, &result.seen].map(|text| escaped(text.as_deref().unwrap_or_default()));
+    format!("{case}><failure message=\"{asked}: {seen}\"/></testcase>\n")
 }
 
 /// A scenario that could not be run: one test case with an error.

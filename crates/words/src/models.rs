@@ -78,6 +78,11 @@ fn device(text: &str) -> Option<Result<&'static Description, String>> {
     Some(reading.and_then(|reading| keep_of(&reading.eds, name).map_err(|error| format!("{name}: {error}"))))
 }
 
+/// All that are known by name.
+pub fn known() -> impl Iterator<Item = &'static Description> {
+    models().chain(DEVICES.iter().filter_map(|(name, _)| device(name)?.ok()))
+}
+
 /// True for what has the ending of a file that describes a device.
 fn is_file(text: &str) -> bool {
     let ending = Path::new(text).extension().and_then(|ending| ending.to_str()).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use canopen::Mux;
 use canopen::od::{Entry, Table};
-use devices::names::is_former;
+use devices::names::{by_name as standard_by_name, is_former};
 
 use super::suggest::{did_you_mean, near};
 
@@ -48,9 +48,16 @@ impl ObjectArg {
         match self {
             Self::Mux(mux) => Ok((*mux, table.and_then(|table| row(table, *mux)))),
             Self::Name(name) => {
-                let table = table.ok_or_else(|| {
-                    format!("the node's model is not known, so '{name}' cannot be looked up; give the index, e.g. 6064, or --model NODE=MODEL")
-                })?;
+                let Some(table) = table else {
+                    // What CiA 301 and CiA 402 name is the same on every device.
+                    let standard = standard_by_name(name).ok_or_else(|| {
+                        format!(
+                            "the node's model is not known, and '{name}' is not an object of CiA 301 or CiA 402; give the index, e.g. 6064, or \
+                             --model NODE=MODEL"
+                        )
+                    });
+                    return standard.map(|mux| (mux, None));
+                };
                 let row = by_name(table, name)?;
                 Ok((row.mux(), Some(row)))
             }
@@ -122,6 +129,14 @@ mod tests {
         assert!(find("FFFFF").unwrap_err().contains("longer than an index: expected 4 hexadecimal digits"));
         assert!(find("highest_sub_index").unwrap_err().contains("1401h:00"));
         assert!(object("velocity").unwrap().resolve(None).err().unwrap().contains("--model"));
+        for (name, mux) in [
+            ("statusword", Mux::new(0x6041, 0)),
+            ("vendor_id", Mux::new(0x1018, 1)),
+            ("identity_object", Mux::new(0x1018, 0)),
+            ("position_actual_value", Mux::new(0x6064, 0)),
+        ] {
+            assert_eq!(object(name).unwrap().resolve(None).map(|found| found.0), Ok(mux), "{name}");
+        }
     }
 
     #[test]

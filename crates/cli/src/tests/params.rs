@@ -84,7 +84,20 @@ fn what_cannot_be_stored_for_want_of_a_model_is_refused_before_the_first_write()
     let (bench, folder) = (bench(), scratch("params_unknown"));
     let file = folder.values("wanted.toml", "1017 = 200\n");
     bench.refused(&["params", "apply", "4", &file, "--save"], &["--model 4=zlac8030l", "Nothing was sent"]);
-    assert_eq!(bench.json(&["read", "4", "1017"])["value"], 0);
+}
+
+/// What a node derives from its node-ID is the same where the other derives it too.
+#[test]
+fn two_nodes_are_compared_as_if_they_had_one_node_id() {
+    let bench = VirtualBus::of(&["m4230e17b50@4", "m4230e17b50@5"]);
+    assert!(bench.done(&["params", "diff", "4", "5"]).out.contains("node 4 has the values of node 5"));
+    bench.done(&["write", "5", "1800:03", "1500"]);
+    bench.done(&["write", "5", "1800:01", "0x80000199"]);
+    let compared = bench.json(&["params", "diff", "4", "5"]);
+    let rows = compared["differences"].as_array().unwrap();
+    let objects: Vec<_> = rows.iter().map(|row| row["object"].as_str().unwrap()).collect();
+    assert_eq!(objects, ["1800h:01", "1800h:03"], "{compared}");
+    assert!(rows[1]["second"]["text"].as_str().is_some_and(|text| text.starts_with("150.0 ms")), "{compared}");
 }
 
 /// A file of a servo by its data sheet says the type of each value: it is read where that sheet is not known, and on the drive again.
@@ -92,6 +105,16 @@ fn what_cannot_be_stored_for_want_of_a_model_is_refused_before_the_first_write()
 fn the_files_of_a_servo_by_its_data_sheet_are_compared_without_that() {
     let folder = scratch("params_of_sheet");
     let sheet = folder.write("maker.eds", &without_bus(&["eds", "cia402"]).out);
+    let unknown = VirtualBus::of(&["io401@5"]);
+    // What the standard names has its name all the same.
+    assert_eq!(unknown.json(&["read", "5", "device_type"])["object"], "1000h:00");
+    let strange = unknown.run(&["read", "5", "wheel_speed"]);
+    assert_eq!(strange.status, Some(2), "{}", strange.err);
+    assert!(
+        strange.err.contains("not an object of CiA 301 or CiA 402") && strange.err.contains("--model"),
+        "{}",
+        strange.err
+    );
     let bench = VirtualBus::of(&[&format!("{sheet}@5")]).with(&["--model", &format!("5={sheet}")]);
     let [before, after] = ["before.toml", "after.toml"].map(|name| folder.path(name));
     bench.done(&["params", "backup", "5", "-o", &before]);

@@ -54,8 +54,13 @@ fn a_sweep_reports_how_many_failed_how_figures_are_spread_and_how_to_repeat_a_ru
     let text = text.replace("never = \"2 rotor_position = 8000 +- 40\"", "that = \"2 rotor_position > 7000\"");
     std::fs::write(&file, text).unwrap();
     let path = file.to_str().unwrap();
-    let failed = ferrodrive(&["run", path, "--seeds", "5..5"]);
+    let junit = directory.join("runs.xml");
+    let failed = ferrodrive(&["run", path, "--seeds", "5..5", "--junit", junit.to_str().unwrap()]);
     assert_eq!(failed.status, Some(1), "{}", failed.out);
+    // A case for each run, named as it is repeated.
+    let xml = std::fs::read_to_string(&junit).unwrap();
+    assert!(xml.contains("tests=\"3\" failures=\"1\"") && xml.matches("<testcase ").count() == 3, "{xml}");
+    assert!(xml.contains("name=\"--seed 5 --set held=333ms\"") && xml.contains("2 rotor_position &gt; 7000"), "{xml}");
     let again = format!("ferrodrive run {path} --seed 5 --set held=333ms");
     assert!(failed.out.contains(&again) && failed.out.contains("2 of 3 runs passed, 1 failed"), "{}", failed.out);
     let repeated = ferrodrive(&["run", path, "--seed", "5", "--set", "held=333ms"]);

@@ -198,6 +198,11 @@ fn words_of_other_tools_are_answered_with_the_command_that_does_it() {
     refused(&["velocity", "4", "60", "rpm"], &["did you mean: ferrodrive velocity 4 60rpm"]);
     refused(&["sim", "zlac8030l@4"], &["did you mean: ferrodrive sim --drive zlac8030l@4"]);
     refused(&["mode", "4", "3"], &["tip: ferrodrive state 4"]);
+    refused(&["params", "diff", "wheel.toml", "5"], &["ferrodrive params diff 5 wheel.toml"]);
+    refused(&["params", "diff", "4", "500"], &["1 to 127"]);
+    refused(&["models"], &["tip: ferrodrive objects"]);
+    refused(&["run", "a.toml", "--seeds", "20"], &["a range of seeds FIRST..LAST, e.g. 1..1000"]);
+    refused(&["conform", "4", "--only", "NMT"], &["SDO, PDO, OD", "STATE, TRANS"]);
     refused(&["start", "4"], &["tip: ferrodrive nmt 4 start"]);
     refused(
         &["diff", "a.eds", "b.eds"],
@@ -403,6 +408,12 @@ fn a_bus_that_cannot_be_opened_says_what_to_do() {
 
 #[test]
 fn departures_from_the_standard_are_listed_with_their_object_and_what_to_do() {
+    let models = done(&["--json", "objects"]).json();
+    let names: Vec<_> =
+        models["models"].as_array().unwrap().iter().map(|model| model["name"].as_str().unwrap()).collect();
+    for name in ["zlac8030l", "m8025e25b80", "zlim42c", "cia402", "io401"] {
+        assert!(names.contains(&name) && done(&["objects"]).out.contains(name), "{names:?}");
+    }
     let text = done(&["objects", "zlac8030l", "--departures"]).out;
     for part in [
         "6083h:00  ramps are times, not accelerations",

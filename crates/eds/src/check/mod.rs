@@ -1,6 +1,7 @@
 //! What only shows when a file is looked at as a whole: traps for tools that work with it.
 
 mod at;
+mod device;
 pub(crate) mod names;
 mod pdo;
 mod records;
@@ -16,8 +17,10 @@ pub(crate) fn all(document: &Document, eds: &Eds, findings: &mut Findings) {
         names::object(object, findings);
         records::object(object, findings);
     }
+    device::info(document, eds, findings);
     modes(eds, findings);
     pdo::identifiers(eds, findings);
+    pdo::shared_identifiers(eds, findings);
     pdo::mappings(eds, findings);
 }
 
@@ -43,7 +46,7 @@ fn modes(eds: &Eds, findings: &mut Findings) {
     for offset in (0..8).map(|axis| axis * 0x800) {
         let is_drive = [0x6040, 0x6041].iter().all(|index| eds.variable(index + offset, 0).is_some());
         let Some(said) = eds.variable(0x6502 + offset, 0).filter(|_| is_drive) else { continue };
-        let is_open = match said.value.as_ref().or(said.default.as_ref()) {
+        let is_open = match said.value_or_default() {
             None => true,
             Some(Value::Number(number)) => number.base == 0,
             Some(_) => false,

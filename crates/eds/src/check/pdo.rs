@@ -1,6 +1,8 @@
 //! PDOs as delivered: what is mapped, and under which identifiers. Source: CiA 301, 7.5.2.33 to 7.5.2.38.
 
-use canopen::Mux;
+use std::collections::BTreeMap;
+
+use canopen::{CobId, Mux};
 
 use super::at::finding;
 use crate::value::Number;
@@ -16,6 +18,33 @@ pub(super) fn identifiers(eds: &Eds, findings: &mut Findings) {
             let what = format!("{base:X}h without $NODEID: every node would have the same identifier");
             let sub_index = (index != 0x1014).then_some(sub_index);
             findings.push(finding(Rule::Identifier, variable.line, index, sub_index, what));
+        }
+    }
+}
+
+/// Two things that the device sends, or two that it takes, under one identifier as delivered.
+pub(super) fn shared_identifiers(eds: &Eds, findings: &mut Findings) {
+    let of_pdos = |first: u16| move |index: &u16| (first..=first + 0x1FF).contains(index);
+    let pdos = |first| eds.objects.iter().map(|object| object.index).filter(of_pdos(first)).map(|index| (index, 1));
+    let sent = [(0x1014, 0), (0x1200, 2)].into_iter().chain(pdos(0x1800)).collect::<Vec<_>>();
+    let taken = [(0x1200, 1)].into_iter().chain(pdos(0x1400)).collect::<Vec<_>>();
+    for places in [sent, taken] {
+        let mut seen = BTreeMap::new();
+        for (index, sub_index) in places {
+            let Some(variable) = eds.variable(index, sub_index) else { continue };
+            let Some(Value::Number(number)) = variable.value_or_default() else { continue };
+            if number.base & i128::from(CobId::INVALID) != 0 {
+                continue;
+            }
+            let node_id = eds.commissioning.as_ref().and_then(|device| device.node_id);
+            let plus_node_id = number.plus_node_id && node_id.is_none();
+            let identifier = node_id.map_or(number.base, |node_id| number.at_node(node_id)) & 0x1FFF_FFFF;
+            if let Some(first) = seen.insert((identifier, plus_node_id), index) {
+                let what =
+                    format!("{} is the identifier of {first:04X}h, too", Number { base: identifier, plus_node_id });
+                let sub_index = (index != 0x1014).then_some(sub_index);
+                findings.push(finding(Rule::SharedIdentifier, variable.line, index, sub_index, what));
+            }
         }
     }
 }

@@ -86,7 +86,7 @@ fn row(object: &Object, variable: &Variable, name: String, storing: Storing) -> 
         AccessType::ReadWrite | AccessType::ReadWriteInput | AccessType::ReadWriteOutput => Access::ReadWrite,
     };
     let mut row = Entry::new(object.index, variable.sub_index, data_type, access, "", "");
-    let value = variable.value.as_ref().or(variable.default.as_ref());
+    let value = variable.value_or_default();
     let bytes = match value {
         Some(Value::Text(text)) => Some(bytes(data_type, text)),
         Some(value) => {

@@ -316,7 +316,7 @@ fn values(path: &Path) -> Result<BTreeMap<Mux, Vec<u8>>, Failure> {
             values.insert(object, configuration(&folder.join(&variable.download_file), object)?);
             continue;
         }
-        if let Some(Value::Number(number)) = variable.value.as_ref().or(variable.default.as_ref()) {
+        if let Some(Value::Number(number)) = variable.value_or_default() {
             // A number of up to 64 bits, in two's complement: SDO carries its lowest bytes.
             values.insert(object, (number.at_node(own) as u64).to_le_bytes().to_vec());
         }

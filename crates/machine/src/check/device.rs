@@ -75,7 +75,7 @@ impl Device {
     /// What an object holds in a device as delivered, or as a DCF wants it.
     pub(super) fn value(&self, mux: Mux, node: Option<NodeId>) -> Option<i128> {
         let variable = self.eds.variable(mux.index, mux.sub_index)?;
-        number(variable.value.as_ref().or(variable.default.as_ref())?, node)
+        number(variable.value_or_default()?, node)
     }
 
     /// True if the sheet has an object of this index.

@@ -16,7 +16,7 @@ use super::generated::Planned;
 use super::intended::{Intended, IntendedNode, MovedAt};
 use super::predict::CYCLE;
 use super::{Checked, CheckedNode};
-use super::{base, groups};
+use super::{base, groups, joints};
 use crate::file::{Machine, pdo_id};
 use words::document::reader::{self, Field, Parameters, Table};
 use words::document::{BadFile, Problem};
@@ -56,7 +56,7 @@ impl Places {
 pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     let machine = Machine::parse_in(text, folder)?;
     // What the world around the drives refuses is reported too.
-    machine.build()?;
+    let mut world = machine.build()?;
     let all = |file: &Table<'_>| Ok::<_, Vec<Problem>>((places(file), periods(file), radii(file)));
     let (places, periods, radii) = reader::read(text, &Parameters::new(), "a machine file", all).unwrap_or_default();
     let mut found = Findings::default();
@@ -75,6 +75,9 @@ pub fn of_machine(text: &str, folder: &Path) -> Result<Checked, BadFile> {
     if let Some(at) = periods.last() {
         base::limits(&machine, &intended.nodes, *at, &mut report);
     }
+    let units_of = |node: NodeId| places.get(&node.raw())?.keys.get("units").copied();
+    joints::gears(&machine, (&intended.nodes, &mut world), units_of, &mut report);
+    joints::weights(&machine, (&intended.nodes, &mut world), &mut report);
     let row = |(node, place): (&NodeId, &IntendedNode)| CheckedNode {
         name: place.name.clone(),
         node: Some(node.raw()),

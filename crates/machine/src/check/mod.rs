@@ -11,6 +11,7 @@ mod finding;
 mod generated;
 mod groups;
 mod intended;
+mod joints;
 mod live;
 mod machine;
 mod predict;

@@ -41,14 +41,15 @@ impl Joined {
     pub(super) fn parse(field: &Field<'_>) -> Result<Self, Problem> {
         let table = field.table("a body", "a table of its own for each body, begun by [[body]]")?;
         let kind = table.need("kind", KIND)?;
-        let (coupling, own) = match kind.text(KIND)? {
-            "differential-drive" => (Coupling::DifferentialDrive(base(&table)?), BASE_KEYS),
-            "common-shaft" => (Coupling::CommonShaft(shaft(&table)?), SHAFT_KEYS),
-            "arm" => (Coupling::Arm(Box::new(arm(&table)?)), ARM_KEYS),
-            "external" => (Coupling::External(external(&table)?), EXTERNAL_KEYS),
+        // First what is misspelt, else it would be missing.
+        let takes = |own: &[&str]| table.takes_only(&[&["name", "kind", "drives", "turns"], own].concat());
+        let coupling = match kind.text(KIND)? {
+            "differential-drive" => takes(BASE_KEYS).and_then(|()| base(&table)).map(Coupling::DifferentialDrive)?,
+            "common-shaft" => takes(SHAFT_KEYS).and_then(|()| shaft(&table)).map(Coupling::CommonShaft)?,
+            "arm" => takes(ARM_KEYS).and_then(|()| arm(&table)).map(|arm| Coupling::Arm(Box::new(arm)))?,
+            "external" => takes(EXTERNAL_KEYS).and_then(|()| external(&table)).map(Coupling::External)?,
             _ => return Err(kind.wrong(KIND)),
         };
-        table.takes_only(&[&["name", "kind", "drives", "turns"], own].concat())?;
         let name = table.need("name", "a name without blanks, e.g. \"base\"")?;
         let text = name.text("a name")?;
         if text.is_empty() || text.contains(char::is_whitespace) {
@@ -68,6 +69,12 @@ impl Joined {
             return None;
         };
         Some((model, [left, right].map(|shaft| (shaft.place.node, shaft.turns))))
+    }
+
+    /// An arm: what it is, and the shafts of its joints.
+    pub(super) fn arm(&self) -> Option<(&ArmModel, &[CoupledShaft])> {
+        let Coupling::Arm(model) = &self.coupling else { return None };
+        Some((model, &self.shafts))
     }
 
     /// Joins the drives, which are in the world already.
@@ -223,6 +230,10 @@ mod tests {
         assert!(with(&format!("{shaft}[4, 5]\nturns = [1]")).contains("1 turns for 2 drives"));
         assert!(with(&format!("{shaft}[4, 5]\ninertia_kg_m2 = -1")).contains("must be 0 to 1e6"));
         assert!(with(&format!("{shaft}[4, 5]\nwheel_radius_m = 1")).contains("has no 'wheel_radius_m'"));
+        assert!(
+            with("kind = 'differential-drive'\ndrives = [4, 5]\nmas_kg = 30")
+                .contains("has no 'mas_kg'; did you mean mass_kg?")
+        );
         assert!(with("kind = 'arm'\ndrives = [4]\nlink = []").contains("0 links; an arm has one to 7"));
         let external = "kind = 'external'\ndrives = ";
         assert!(with(&format!("{external}[]")).contains("0 drives; an external body has one to 7"));

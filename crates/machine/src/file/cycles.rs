@@ -13,7 +13,7 @@ use master::plan::{NodeTraffic, Plan, Settings, plan, shortest_cycle};
 use master::units::Shown;
 use master::{Drive, Gear, Node};
 
-use super::{BasePlan, GroupPlan, Machine};
+use super::{BasePlan, GroupPlan, Machine, Placed};
 use words::failure::Failure;
 
 /// From one SYNC of a group to the next where nothing says it.
@@ -176,6 +176,11 @@ impl Machine {
     /// What stands behind the shaft of a drive: `units`. [`Gear::DIRECT`] for a node that is not in the file.
     pub fn gear(&self, node: NodeId) -> Gear {
         self.drives.iter().find(|drive| drive.spec.node == node).map_or(Gear::DIRECT, |drive| drive.gear)
+    }
+
+    /// Turns of a drive's shaft for one turn of its simulated load; 1 without a gear there.
+    pub(crate) fn load_gear(&self, node: NodeId) -> f64 {
+        self.drives.iter().find(|drive| drive.spec.node == node).map_or(1.0, Placed::load_gear)
     }
 
     /// The drive at a node as the file has it: its model, and the gear behind its shaft. A program that moves a drive

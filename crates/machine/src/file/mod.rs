@@ -22,10 +22,9 @@ use can::Bitrate;
 use canopen::{Mux, NodeId};
 use master::identify::Identity;
 use master::parameters::{Parameters, from_any_state};
-use plant::coupled::DifferentialDriveModel;
-use sim::Fidelity;
+use plant::coupled::{ArmModel, DifferentialDriveModel};
 use sim::machine::{Realism, TimingMode};
-use sim::{VirtualDrive, World};
+use sim::{CoupledShaft, Fidelity, VirtualDrive, World};
 
 use bodies::Joined;
 pub use configuration::{mapped, pdo_id, sdo_server_record, tpdo_id};
@@ -306,6 +305,11 @@ impl Machine {
         self.bodies
             .iter()
             .filter_map(|body| body.differential_drive().map(|(model, wheels)| (body.name(), model, wheels)))
+    }
+
+    /// The arms that it simulates: name, model, and the shafts of its joints, the base first.
+    pub(crate) fn arms(&self) -> impl Iterator<Item = (&str, &ArmModel, &[CoupledShaft])> {
+        self.bodies.iter().filter_map(|body| body.arm().map(|(model, shafts)| (body.name(), model, shafts)))
     }
 
     /// The names of the machines that its drives move together.

@@ -6,7 +6,7 @@ use std::path::Path;
 use can::Instant;
 use canopen::{Mux, NodeId};
 use master::Gear;
-use sim::{Place, Source, Stimulus, VirtualDrive, World};
+use sim::{LoadPart, Place, Source, Stimulus, VirtualDrive, World};
 use words::document::reader::Table;
 use words::document::{BadFile, Located, Problem};
 use words::drive::DriveSpec;
@@ -82,6 +82,15 @@ impl From<DriveSpec> for Placed {
 }
 
 impl Placed {
+    /// Turns of its shaft for one turn of its simulated load; 1 without a gear there.
+    pub(super) fn load_gear(&self) -> f64 {
+        let ratio = |(stimulus, _): &(Stimulus, Located)| match stimulus {
+            Stimulus::Load(LoadPart::Gear { ratio, .. }) => Some(*ratio),
+            _ => None,
+        };
+        self.around.iter().find_map(ratio).unwrap_or(1.0)
+    }
+
     /// Sets the supply of the drive, before the power comes on: capacitors once charged would hold another voltage for a
     /// while.
     ///

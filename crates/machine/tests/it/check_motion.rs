@@ -163,3 +163,50 @@ fn a_base_is_held_against_its_drives_and_against_the_body_that_they_move() {
         assert!(all.len() == 1 && all[0].severity == Severity::Warning && all[0].what.contains(part), "{all:?}");
     }
 }
+
+/// "M Robot Joint Motor CanOpen Manual", Parameters: the M8025E25B50 gives 51 N·m and 127 N·m for moments, the M4230E17B80 has a gear
+/// of 80.
+#[test]
+fn an_arm_that_is_too_heavy_and_a_gear_that_is_another_are_said() {
+    let arm = |payload_kg: f64, range: &str| {
+        let joint =
+            |node: u8| format!("[[drive]]\nmodel = 'm8025e25b50'\nnode = {node}\nunits = {{ gear_ratio = 50 }}\n");
+        format!(
+            "bitrate = '1M'\n{}{}[[body]]\nname = 'arm'\nkind = 'arm'\ndrives = [1, 2]\ntool_m = [0.2, 0, 0]\npayload_kg = {payload_kg}\n\
+             gravity_m_s2 = [0, 0, -9.81]\n[[body.link]]\noffset_m = [0, 0, 0.2]\naxis = [0, -1, 0]\nmass_kg = 1.5\ncenter_m = [0.15, 0, 0]\n\
+             first_deg = 90\n[[body.link]]\noffset_m = [0.3, 0, 0]\naxis = [0, -1, 0]\nmass_kg = 0.5\ncenter_m = [0.1, 0, 0]\nfirst_deg = -90\n{range}",
+            joint(1),
+            joint(2),
+        )
+    };
+    let said = |text: &str, rule: &str| -> Vec<Finding> {
+        let all = of_machine(text, Path::new("")).unwrap_or_else(|bad| panic!("{text}{bad}")).findings;
+        all.into_iter().filter(|finding| finding.rule == rule).collect()
+    };
+    // Both links level: (1.5 kg 0.15 m + 0.5 kg 0.4 m + payload 0.5 m) 9.81 m/s² = 51 N·m with 9.55 kg.
+    assert_eq!(said(&arm(9.5, ""), "arm-load"), []);
+    let heavy = said(&arm(9.6, ""), "arm-load");
+    assert_eq!((heavy.len(), heavy[0].node, heavy[0].severity), (1, Some(1), Severity::Warning), "{heavy:?}");
+    assert!(heavy[0].what.contains("up to 51.3 N·m") && heavy[0].what.contains("51 N·m all the time"), "{heavy:?}");
+    assert!(heavy[0].what.contains("gets too hot"), "{heavy:?}");
+    // 127 N·m with 25.04 kg; the second joint has 49.6 N·m of it.
+    for (payload_kg, holds) in [(25.0, true), (25.1, false)] {
+        let heavy = said(&arm(payload_kg, ""), "arm-load");
+        assert_eq!(heavy.len(), 1, "{heavy:?}");
+        assert_eq!(heavy[0].what.contains("cannot hold"), !holds, "{heavy:?}");
+    }
+    // A group that keeps the upper arm within 30 degrees of upright: 35.3 N·m.
+    let range = "[[group]]\nname = 'g'\nperiod = '4ms'\n[[group.axis]]\nnode = 1\nrange_deg = [-30, 30]\nvelocity_deg_s = 60\n\
+                 acceleration_deg_s2 = 600\njerk_deg_s3 = 6000\nfollowing_error_deg = 20\n";
+    assert_eq!(said(&arm(9.6, range), "arm-load"), []);
+
+    assert_eq!(said(&arm(1.0, range), "gear-ratio"), []);
+    let other = said(&arm(1.0, range).replacen("m8025e25b50", "m4230e17b80", 1), "gear-ratio");
+    assert_eq!((other.len(), other[0].node, other[0].severity), (1, Some(1), Severity::Warning), "{other:?}");
+    assert!(other[0].what.contains("`gear_ratio` is 50") && other[0].what.contains("56.25 deg"), "{other:?}");
+    assert!(other[0].next.contains("gear_ratio = 80"), "{other:?}");
+    let without = arm(1.0, range).replacen("units = { gear_ratio = 50 }\n", "", 1);
+    let motor = said(&without, "gear-ratio");
+    assert_eq!((motor.len(), motor[0].severity), (1, Severity::Note), "{motor:?}");
+    assert!(motor[0].what.contains("those of its motor"), "{motor:?}");
+}

@@ -19,6 +19,7 @@ const GEAR: GearModel = GearModel {
     mesh_loss: 0.0,
     output_coulomb_nm: 0.0,
     kinematic_error_rad: 0.0,
+    rated_nm: f64::INFINITY,
     peak_nm: f64::INFINITY,
     ratchet_nm: f64::INFINITY,
 };

@@ -157,10 +157,12 @@ class RampTuning(TypedDict):
 
 
 class AxisState(TypedDict):
-    """An axis of a group in its last cycle."""
+    """An axis of a group in its last cycle. ``following_error_deg`` is how far its shaft was from the set-point that it had then, as the
+    group judges it: behind the time that the drive is allowed."""
 
     angle_deg: Optional[float]
     set_point_deg: float
+    following_error_deg: Optional[float]
     power: Optional[str]
 
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::results::RunResult;
 use super::{Point, Sweep};
+use crate::junit::{case_of_run, suite_of_runs};
 
 /// Failed runs that are listed: those with the lowest numbers.
 const MOST_LISTED: usize = 10;
@@ -28,6 +29,8 @@ pub struct Summary {
     /// By the parameter that is swept, and by its value: runs that passed, and that failed.
     values: Vec<Vec<(u64, u64)>>,
     figures: BTreeMap<String, FigureSpread>,
+    /// A test case of JUnit's XML for each run, where that was asked for; it grows with them.
+    cases: Option<String>,
 }
 
 /// The runs of one setting of the parameters, which differ in their seeds alone.
@@ -95,8 +98,22 @@ struct FigureSpread {
 }
 
 impl Summary {
+    /// One that lists each run for [`to_junit`](Self::to_junit), too.
+    pub fn with_cases() -> Self {
+        Self { cases: Some(String::new()), ..Self::default() }
+    }
+
+    /// As a test suite in JUnit's XML, a test case for each run; without any if they were not asked for.
+    pub fn to_junit(&self, sweep: &Sweep) -> String {
+        let (runs, cases) = (self.passed + self.failures, self.cases.as_deref().unwrap_or_default());
+        suite_of_runs(sweep.title(), (runs, self.failures), cases)
+    }
+
     /// Adds the result of a run.
     pub fn add(&mut self, sweep: &Sweep, result: &RunResult) {
+        if let Some(cases) = &mut self.cases {
+            cases.push_str(&case_of_run(sweep.title(), &sweep.point(result.run).options(), result));
+        }
         if let Some(digest) = result.digest.as_ref().and_then(|digest| u64::from_str_radix(digest, 16).ok()) {
             self.add_digest(sweep, result.run, digest);
         }

@@ -66,6 +66,7 @@ const COMMANDS: &[(&[&str], &str)] = &[
     (&["objects", "zlac8030l"], "objects"),
     (&["objects", "4", "6081"], "objects"),
     (&["objects", "zlim42c", "--departures"], "departures"),
+    (&["objects"], "models"),
     (&["readings", "m4230e17b50"], "readings"),
     (&["eds", "zlac8030l"], "eds"),
     (&["eds", "lint", "--list"], "eds_rules"),

@@ -62,17 +62,36 @@ struct Backup {
     force: bool,
 }
 
-/// Show the differences between a node and a file, or between two files
+/// Show the differences between a node and a file, between two nodes, or between two files
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  ferrodrive --bus can0 params diff 4 wheel.toml\n  \
-    ferrodrive params diff before.toml after.dcf")]
+    ferrodrive --bus can0 params diff 4 5\n  ferrodrive params diff before.toml after.dcf")]
 struct Diff {
     /// Node-ID or file
-    #[arg(value_name = "NODE|FILE")]
-    first: String,
-    /// File
-    #[arg(value_name = "FILE", value_parser = parameters_path)]
-    second: PathBuf,
+    #[arg(value_name = "NODE|FILE", value_parser = node_or_file)]
+    first: NodeOrFile,
+    /// Node-ID (after one) or file; what depends on the node-ID is compared as of the first
+    /// node, and node-ID and bit rate are left out
+    #[arg(value_name = "NODE|FILE", value_parser = node_or_file)]
+    second: NodeOrFile,
+}
+
+/// Whose parameters are compared.
+#[derive(Clone, Debug)]
+enum NodeOrFile {
+    Node(NodeId),
+    File(PathBuf),
+}
+
+fn node_or_file(text: &str) -> Result<NodeOrFile, String> {
+    match node(text) {
+        Ok(id) => Ok(NodeOrFile::Node(id)),
+        // A number is not meant as a file.
+        Err(error) if text.starts_with(|first: char| first.is_ascii_digit()) && !text.contains('.') => {
+            Err(error.to_string())
+        }
+        Err(_) => parameters_path(text).map(NodeOrFile::File),
+    }
 }
 
 /// Show what `apply` would write, in order; nothing is written

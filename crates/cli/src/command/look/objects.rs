@@ -12,25 +12,25 @@ use crate::output::Report;
 use console::command::drive::guessed;
 use plot::Paint;
 use plot::Table;
-use words::models::{Description, resolve};
+use words::models::{Description, is_from_file, known, resolve};
 use words::node::node;
 use words::object::{ObjectArg, object};
 use words::unresolved::Unresolved;
 
-/// List the object dictionary of a model or of a node
+/// List the object dictionary of a model or of a node; without one, the models
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
+    after_help = "Examples:\n  ferrodrive objects\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
         ferrodrive objects zlac8030l,firmware=2.01 202F\n  ferrodrive objects zlac8030l --departures"
 )]
 pub(crate) struct Objects {
     /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID
     #[arg(value_name = "MODEL|FILE.eds|NODE", value_parser = whose)]
-    pub(crate) whose: Whose,
+    pub(crate) whose: Option<Whose>,
     /// Show only objects with this index, or with this word in name, title or meaning
     search: Vec<String>,
     /// Show where the model departs from CiA 301 and CiA 402, and what a program written for them has to do
-    #[arg(long, conflicts_with = "search")]
+    #[arg(long, conflicts_with = "search", requires = "whose")]
     pub(crate) departures: bool,
 }
 
@@ -48,6 +48,53 @@ fn whose(text: &str) -> Result<Whose, Unresolved> {
         return Ok(Whose::Node(node(text)?));
     }
     resolve(text).map(Whose::Model)
+}
+
+/// The models that are known by name.
+#[derive(Debug, Serialize)]
+pub(crate) struct ModelList {
+    models: Vec<ModelRow>,
+}
+
+#[derive(Debug, Serialize)]
+struct ModelRow {
+    name: &'static str,
+    title: &'static str,
+    /// What it is known from.
+    manual: &'static str,
+    /// Axes that it moves; 0 for what is not a drive.
+    axes: usize,
+    /// Node-ID as delivered.
+    node_id: Option<u8>,
+    /// Bit rate as delivered, in kbit/s.
+    bitrate_kbit: Option<u32>,
+}
+
+impl ModelList {
+    pub(crate) fn new() -> Self {
+        let row = |model: &Description| ModelRow {
+            name: model.name,
+            title: model.title,
+            manual: if is_from_file(model) { "an EDS that is built in" } else { model.manual },
+            axes: model.axes.len(),
+            node_id: model.node_id.map(NodeId::raw),
+            bitrate_kbit: model.bitrate.map(|bitrate| bitrate.bits_per_second() / 1000),
+        };
+        Self { models: known().map(row).collect() }
+    }
+}
+
+impl Report for ModelList {
+    fn text(&self, paint: Paint) -> String {
+        let mut table = Table::new(&["model", "what it is", "node-ID", "kbit/s", "known from"]);
+        let delivered = |number: Option<u32>| number.map_or_else(String::new, |number| number.to_string());
+        for row in &self.models {
+            let (node_id, bitrate) = (delivered(row.node_id.map(u32::from)), delivered(row.bitrate_kbit));
+            table.row([row.name.to_owned(), row.title.to_owned(), node_id, bitrate, row.manual.to_owned()]);
+        }
+        let rest = "Any other device: FILE.eds in place of a model. Objects of a model: ferrodrive objects MODEL";
+        format!("{}\n{rest}", table.plain(paint))
+    }
 }
 
 /// The rows found.
@@ -327,7 +374,7 @@ mod tests {
     fn found(words: &[&str]) -> Vec<&'static str> {
         let search = words.iter().map(|word| (*word).into()).collect();
         let (_, model) = embedded()[0];
-        let list = Objects { whose: Whose::Model(model), search, departures: false }.list(model);
+        let list = Objects { whose: Some(Whose::Model(model)), search, departures: false }.list(model);
         list.map(|list| list.objects.iter().map(|row| row.name).collect()).unwrap_or_default()
     }
 

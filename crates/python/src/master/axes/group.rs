@@ -177,11 +177,13 @@ impl Group {
         self.network.get().check_open()?;
         let value = self.slot.with(|group| {
             let state = group.state();
-            let axes = group.axes().iter().zip(group.points()).map(|(axis, point)| {
-                let angle = axis.position.map_or(Value::None, |Turns(turns)| Value::Real(turns * 360.0));
+            let shown = group.axes().iter().zip(group.points()).zip(group.following_errors());
+            let degrees = |turns: Option<f64>| turns.map_or(Value::None, |turns| Value::Real(turns * 360.0));
+            let axes = shown.map(|((axis, point), error_turns)| {
                 Value::Record(vec![
-                    ("angle_deg", angle),
+                    ("angle_deg", degrees(axis.position.map(|Turns(turns)| turns))),
                     ("set_point_deg", Value::Real(point.position_turns * 360.0)),
+                    ("following_error_deg", degrees(error_turns)),
                     ("power", axis.power.map_or(Value::None, |power| Value::Text(power.name().to_owned()))),
                 ])
             });

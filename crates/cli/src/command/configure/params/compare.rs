@@ -1,14 +1,11 @@
 //! `ferrodrive params diff` and `verify`.
 
-use std::path::Path;
-
 use host::network::params::{
-    DiffReport, Shown, VerifyReport, diff_of_files, diff_of_node, source as files, verify_node,
+    DiffReport, Shown, VerifyReport, back_up, diff_of_files, diff_of_node, source as files, verify_node,
 };
 use words::counted;
-use words::node::node;
 
-use super::source;
+use super::{NodeOrFile, source};
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::output::Report;
@@ -18,12 +15,27 @@ use plot::Table;
 
 impl super::Diff {
     pub(super) async fn run(&self, context: &Context) -> Result<DiffReport, Failure> {
-        let Ok(id) = node(&self.first) else {
-            return Ok(diff_of_files(Path::new(&self.first), &self.second)?);
+        let first = match (&self.first, &self.second) {
+            (NodeOrFile::Node(first), _) => *first,
+            (NodeOrFile::File(first), NodeOrFile::File(second)) => return Ok(diff_of_files(first, second)?),
+            (NodeOrFile::File(file), NodeOrFile::Node(node)) => {
+                let failure = Failure::usage("the node is named first, then the file that it is compared with");
+                return Err(failure.next(format!("ferrodrive params diff {node} {}", file.display())));
+            }
         };
-        let drive = context.drive(id).await?;
-        let wanted = files::read(&self.second, drive.description(), Some(id))?;
-        Ok(diff_of_node(&drive, &wanted, self.second.display().to_string()).await?)
+        let drive = context.drive(first).await?;
+        let (wanted, whose) = match &self.second {
+            NodeOrFile::File(file) => {
+                (files::read(file, drive.description(), Some(first))?, file.display().to_string())
+            }
+            NodeOrFile::Node(second) => {
+                let (_, mut has, model) = back_up(&(), &context.drive(*second).await?).await?;
+                // Two nodes have two node-IDs.
+                has.values.retain(|object, _| !model.storage.address.contains(object));
+                (has.for_node(first, Some(model)), format!("node {second}"))
+            }
+        };
+        Ok(diff_of_node(&drive, &wanted, whose).await?)
     }
 }
 

@@ -82,7 +82,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "N", conflicts_with = "seeds", hide_short_help = true, value_parser = |text: &str| whole(text, 1..=64_u8))]
     threads: Option<u8>,
     /// Also write the result as JUnit XML, as build servers read it
-    #[arg(long, value_name = "FILE.xml", conflicts_with = "seeds", value_parser = junit_path)]
+    #[arg(long, value_name = "FILE.xml", value_parser = junit_path)]
     junit: Option<PathBuf>,
     #[command(flatten)]
     recording: RecordOptions,
@@ -152,6 +152,7 @@ impl Run {
             output: self.output.as_deref(),
             resume: self.resume,
             merge: &self.merge,
+            junit: self.junit.as_deref(),
             again: self.again(file, seeds),
         };
         sweeping::sweep(&sweep, &asked, file, format)

@@ -9,6 +9,7 @@ use scenario::sweep::{Alike, OfValue, Summary, Sweep, SweepReport, Worst};
 use words::document::BadFile;
 
 use super::crew::Crew;
+use super::loaded::write;
 use super::results::{ResultsFile, merge_files};
 use crate::failure::Failure;
 use crate::output::{Format, Report, is_stdout, print_error};
@@ -32,13 +33,15 @@ pub(super) struct SweepOptions<'a> {
     pub(super) resume: bool,
     /// The files of results that are put together instead of making runs.
     pub(super) merge: &'a [PathBuf],
+    /// Where the results go for build servers.
+    pub(super) junit: Option<&'a Path>,
     /// The options that make the same runs, for a command that repeats them.
     pub(super) again: String,
 }
 
 /// Makes the runs, or puts their results together, and prints what came of them.
 pub(super) fn sweep(sweep: &Sweep, asked: &SweepOptions<'_>, file: &Path, format: Format) -> Result<(), Failure> {
-    let mut summary = Summary::default();
+    let mut summary = if asked.junit.is_some() { Summary::with_cases() } else { Summary::default() };
     if !asked.merge.is_empty() {
         merge_files(asked.merge, asked.output, sweep, &mut summary, &asked.again)?;
         return print(sweep, &summary, asked, file, format, None);
@@ -102,6 +105,9 @@ fn print(
     format: Format,
     ended: Option<Failure>,
 ) -> Result<(), Failure> {
+    if let Some(path) = asked.junit {
+        write(path, &summary.to_junit(sweep))?;
+    }
     let mut report = SweepReport::new(file, sweep, summary);
     let failure = ended.or_else(|| failure(&report));
     report.ok = failure.is_none();
