@@ -1,9 +1,10 @@
 //! The command line as a whole: what every command takes, and the list of commands, each from its own file.
 
 use clap::{Parser, Subcommand};
+use console::command::objects;
 
 use crate::command::configure::{dcf, init, lss, params, program, store, tune};
-use crate::command::look::{dump, emcy, objects, pdo, read, report, studio, top, watch};
+use crate::command::look::{dump, emcy, pdo, read, report, studio, top, watch};
 use crate::command::moving::{drive_base, group, test_motion};
 use crate::command::network::{boot, check, conform, gateway, latency, plan, send, supervise, sync, time};
 use crate::command::record_and_replay::{capture, convert, decode, plot, record, replay};

@@ -42,8 +42,6 @@ use clap::{ArgMatches, FromArgMatches};
 use clap_complete::env::CompleteEnv;
 
 use crate::args::{Cli, Command};
-use crate::command::look::departures::DepartureList;
-use crate::command::look::objects::{ModelList, Objects, Whose};
 use crate::command::network::check::Check;
 use crate::command::tools::completions::ASKED_BY;
 use crate::context::Context;
@@ -53,6 +51,8 @@ use crate::output::{Format, Report, print_line};
 use crate::plain::{plain, short};
 use crate::recording::LogPath;
 use crate::scope::command_line;
+use console::command::departures::DepartureList;
+use console::command::objects::{ModelList, Objects, Whose};
 use plot::Paint;
 
 fn main() -> ExitCode {
@@ -325,7 +325,7 @@ fn check(global: &Global, format: Format, check: &Check) -> Result<(), Failure> 
 
 fn list_objects(global: &Global, format: Format, objects: &Objects) -> Result<(), Failure> {
     match objects.whose {
-        None => print(format, &ModelList::new()),
+        None => print(format, &ModelList::of_all()),
         Some(Whose::Model(model)) if objects.departures => print(format, &DepartureList::of(model, None)),
         Some(Whose::Node(node)) if objects.departures => {
             on_bus(global, format, async |context| objects.departures_of_node(context, node).await)

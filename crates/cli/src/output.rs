@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use console::command;
 use serde::Serialize;
 
 use crate::failure::{Failure, FailureBody};
@@ -15,11 +16,25 @@ pub(crate) trait Report: Serialize {
     fn text(&self, paint: Paint) -> String;
 }
 
-impl Report for console::command::Outcome {
-    fn text(&self, paint: Paint) -> String {
-        self.text(paint)
-    }
+/// What the console of a page prints, too: its words are the same here.
+macro_rules! reports_of_the_console {
+    ($($report:ty),+) => {
+        $(impl Report for $report {
+            fn text(&self, paint: Paint) -> String {
+                self.text(paint)
+            }
+        })+
+    };
 }
+reports_of_the_console!(
+    command::Outcome,
+    command::departures::DepartureList,
+    command::emcy::ErrorEntry,
+    command::emcy::RememberedErrors,
+    command::objects::ModelList,
+    command::objects::ObjectList,
+    command::pdo::PdoList
+);
 
 /// How to print.
 #[derive(Clone, Copy, Debug)]

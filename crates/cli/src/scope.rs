@@ -9,10 +9,10 @@ use clap::{ArgMatches, CommandFactory};
 use transport::BusSpec;
 
 use crate::args::{Cli, Command};
-use crate::command::look::objects::Whose;
 use crate::failure::Failure;
 use crate::global::Global;
 use crate::help;
+use console::command::objects::Whose;
 
 /// Options that a command does not heed, by their names in the parser, and why.
 struct Unheeded {

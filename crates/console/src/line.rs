@@ -16,10 +16,14 @@ use master::explain::Overheard;
 use plot::Paint;
 use words::plain;
 
+use crate::command::emcy::ShowErrors;
 use crate::command::object::ObjectReport;
+use crate::command::objects::Objects;
+use crate::command::pdo::ShowPdos;
 use crate::command::read::Read;
 use crate::command::{Command, CommandEffect};
 use crate::context::{Context, Holding, Others, Shell, Stated};
+use crate::failure::Failure;
 use crate::guard::GuardArgs;
 
 /// How often a line that listens looks at the frames that have come: a full bus has some 10 000 in that time.
@@ -43,8 +47,26 @@ struct CommandLine {
 enum LineCommand {
     // Of the command line this one writes files too.
     Read(Read),
+    Objects(Objects),
+    /// Show the errors that a node remembers
+    #[command(subcommand)]
+    Emcy(EmcyLine),
+    /// Show how the PDOs of a node are set up
+    #[command(subcommand)]
+    Pdo(PdoLine),
     #[command(flatten)]
     OnBus(Command),
+}
+
+/// What a page does not show as it comes, in a view of its own.
+#[derive(Debug, clap::Subcommand)]
+enum EmcyLine {
+    Show(ShowErrors),
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum PdoLine {
+    Show(ShowPdos),
 }
 
 /// Reads lines for a host.
@@ -56,15 +78,18 @@ impl host::console::Reader for Reader {
         let words = words_of(line).map_err(Said::senseless)?;
         // As a line is copied from the manual.
         let words = words.strip_prefix(&["ferrodrive".to_owned()][..]).unwrap_or(&words);
-        let matches = parser().try_get_matches_from(words).map_err(|error| match words.first() {
-            Some(word) if error.kind() == ErrorKind::InvalidSubcommand => {
-                elsewhere(word).unwrap_or_else(|| said(&error))
+        let matches = parser().try_get_matches_from(words).map_err(|error| match words {
+            [word, more @ ..] if error.kind() == ErrorKind::InvalidSubcommand => {
+                let of_two = more.first().and_then(|part| elsewhere(&format!("{word} {part}")));
+                of_two.or_else(|| elsewhere(word)).unwrap_or_else(|| said(&error))
             }
             _ => said(&error),
         })?;
         let CommandLine { command } = CommandLine::from_arg_matches(&matches).map_err(|error| said(&error))?;
         let effect = match &command {
-            LineCommand::Read(_) => CommandEffect::None,
+            LineCommand::Read(_) | LineCommand::Objects(_) | LineCommand::Emcy(_) | LineCommand::Pdo(_) => {
+                CommandEffect::None
+            }
             LineCommand::OnBus(command) => {
                 check(command)?;
                 command.effect()
@@ -113,10 +138,10 @@ fn check(command: &Command) -> Result<(), Said> {
 /// Commands of the program that a line does not have, and the view of a page that does what they do; none where only a shell does.
 const ELSEWHERE: &[(&str, &[&str])] = &[
     ("Drive", &["report"]),
-    ("Faults", &["emcy"]),
+    ("Faults", &["emcy watch"]),
     ("Motion", &["drive-base", "group"]),
-    ("PDO", &["pdo"]),
-    ("Parameters", &["dcf", "objects", "params"]),
+    ("PDO", &["pdo apply", "pdo plan", "pdo watch"]),
+    ("Parameters", &["dcf", "params"]),
     ("Scope", &["capture", "record", "test-motion", "tune", "watch"]),
     ("Trace", &["dump", "send"]),
     ("World", &["events", "world"]),
@@ -171,24 +196,24 @@ const HIDDEN: [&str; 2] = ["guard", "from"];
 
 /// The parser of the command line; its help names nothing that a line does not have.
 fn parser() -> clap::Command {
-    CommandLine::command().mut_subcommands(|command| {
-        let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
-        let mut lines: Vec<String> = Vec::new();
-        for line in
-            examples.lines().filter(|line| ![" -v ", " all", "--model ", "--from "].iter().any(|of| line.contains(of)))
-        {
-            let line = [" --bus can0", " --machine machine.toml", " --json"]
-                .iter()
-                .fold(line.to_owned(), |line, of| line.replace(of, ""));
-            if !lines.contains(&line) {
-                lines.push(line);
-            }
+    CommandLine::command().mut_subcommands(of_a_line)
+}
+
+fn of_a_line(command: clap::Command) -> clap::Command {
+    let examples = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    let is_had = |line: &&str| ![" -v ", " all", "--model ", "--from "].iter().any(|of| line.contains(of));
+    let mut lines: Vec<String> = Vec::new();
+    for line in examples.lines().filter(is_had) {
+        let without = [" --bus can0", " --machine machine.toml", " --json"];
+        let line = without.iter().fold(line.to_owned(), |line, of| line.replace(of, ""));
+        if !lines.contains(&line) {
+            lines.push(line);
         }
-        let guards = |arg: clap::Arg| {
-            if HIDDEN.iter().any(|id| arg.get_id().as_str().ends_with(id)) { arg.hide(true) } else { arg }
-        };
-        command.after_help(lines.join("\n")).mut_args(guards)
-    })
+    }
+    let guards = |arg: clap::Arg| {
+        if HIDDEN.iter().any(|id| arg.get_id().as_str().ends_with(id)) { arg.hide(true) } else { arg }
+    };
+    command.after_help(lines.join("\n")).mut_args(guards).mut_subcommands(of_a_line)
 }
 
 /// What the parser says: help, or what is wrong with the line.
@@ -219,6 +244,13 @@ async fn carry_out(command: &LineCommand, hands: Hands) -> Said {
             };
             read.run(&context, show).await.err()
         }
+        LineCommand::Objects(objects) => text_of(objects.text(&context, Paint::OFF).await, &mut printed),
+        LineCommand::Emcy(EmcyLine::Show(show)) => {
+            text_of(show.run(&context).await.map(|errors| errors.text(Paint::OFF)), &mut printed)
+        }
+        LineCommand::Pdo(PdoLine::Show(show)) => {
+            text_of(show.run(&context).await.map(|pdos| pdos.text(Paint::OFF)), &mut printed)
+        }
         LineCommand::OnBus(command) => match command.run(&context).await {
             Ok(outcome) => {
                 printed.push(outcome.text(Paint::OFF));
@@ -231,6 +263,11 @@ async fn carry_out(command: &LineCommand, hands: Hands) -> Said {
     let complaint = said.trouble.is_some().then(|| said.text.clone());
     let lines: Vec<String> = notes.take().into_iter().chain(printed).chain(complaint).collect();
     Said { text: lines.join("\n"), ..said }
+}
+
+/// Takes what is printed, or gives why there is nothing.
+fn text_of(text: Result<String, Failure>, printed: &mut Vec<String>) -> Option<Failure> {
+    text.map(|text| printed.push(text)).err()
 }
 
 /// A failure whose advice is for people who type into a page.

@@ -12,10 +12,8 @@ pub(crate) mod simulate {
 }
 
 pub(crate) mod look {
-    pub(crate) mod departures;
     pub(crate) mod dump;
     pub(crate) mod emcy;
-    pub(crate) mod objects;
     pub(crate) mod pdo;
     pub(crate) mod read;
     pub(crate) mod report;

@@ -170,9 +170,20 @@ fn a_line_says_in_a_page_what_it_says_in_a_shell() {
         "save 4",
         "nmt 4 pre-operational",
         "nmt 4 start --wait 2s",
+        "objects",
+        "objects zlim42c homing",
+        "objects zlac8030l --departures",
+        "objects 4 velocity",
+        "objects 9",
+        "emcy show 4",
+        "emcy show 1",
+        "pdo show 4",
+        "pdo show 9",
     ] {
         // As long as a page waits.
-        let words: Vec<_> = ["--bus", &bus, "--timeout", "200ms"].into_iter().chain(line.split(' ')).collect();
+        let on_bus = ["--bus", &bus, "--timeout", "200ms"];
+        let of_model = line == "objects" || line.starts_with("objects zl");
+        let words: Vec<_> = on_bus.into_iter().filter(|_| !of_model).chain(line.split(' ')).collect();
         let shell = without_bus(&words);
         let (text, status) = Page::new().line(line);
         let said = format!("{}{}", shell.out, shell.err);
@@ -422,7 +433,21 @@ fn a_speed_along_a_way_is_held_to_the_limit_by_the_feed_of_the_machine_file() {
 #[test]
 fn a_line_is_advised_of_nothing_that_it_does_not_have() {
     let mut page = Page::new();
-    for command in ["state", "enable", "move", "explain", "torque", "home", "estop", "scan", "read", "write"] {
+    for command in [
+        "state",
+        "enable",
+        "move",
+        "explain",
+        "torque",
+        "home",
+        "estop",
+        "scan",
+        "read",
+        "write",
+        "objects",
+        "emcy show",
+        "pdo show",
+    ] {
         let (text, status) = page.line(&format!("help {command}"));
         assert!(
             status == 0
@@ -456,6 +481,8 @@ fn a_line_knows_every_command_of_the_program() {
             status == 2 && text.starts_with(&format!("error: the console of a page has no command '{name}'"));
         assert!(status == 0 || is_elsewhere, "{name}: {status} {text}");
     }
+    let (text, _) = page.line("pdo watch 4");
+    assert!(text.contains("no command 'pdo watch'") && text.contains("the PDO view does that here"), "{text}");
     let (text, _) = page.line("params backup 4");
     assert!(text.contains("the Parameters view does that here; ferrodrive params, in a shell"), "{text}");
 }

@@ -1,14 +1,18 @@
 //! The commands: commands that share everything but a word share a file.
 
+pub mod departures;
 pub mod drive;
 mod effect;
+pub mod emcy;
 pub mod estop;
 pub mod explain;
 pub mod home;
 pub mod motion;
 pub mod nmt;
 pub mod object;
+pub mod objects;
 mod on_bus;
+pub mod pdo;
 pub mod read;
 pub mod scan;
 pub mod several;

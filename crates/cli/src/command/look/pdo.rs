@@ -1,25 +1,22 @@
 //! `ferrodrive pdo`: how the PDOs of a node are set up (CiA 301, clauses 7.5.2.35 to 7.5.2.38), and what they carry.
 
 mod setup;
-mod silent;
 
 use std::time::Duration;
 
 use can::BusFrame;
 use canopen::pdo::Direction;
-use canopen::{CobId, NmtState, NodeId};
+use canopen::{NmtState, NodeId};
 use master::Drive;
 use master::decode::{Decoded, DecodedValue};
-use master::pdo::PdoConfig;
 use serde::Serialize;
 
 use crate::context::Context;
 use crate::failure::Failure;
 use crate::frames::stamp::{Stamps, TimeForm};
 use crate::output::{Format, Report};
-use host::network::pdos::PdoSetup;
+use console::command::pdo::ShowPdos;
 use plot::Paint;
-use plot::Table;
 use words::decode::{self, decode};
 use words::node::node;
 use words::time::some_time;
@@ -38,20 +35,11 @@ pub(crate) struct Pdo {
 
 #[derive(Debug, clap::Subcommand)]
 enum PdoCommand {
-    /// Show identifier, transmission type, timers and mapping of each PDO, and why one is silent
-    Show(Show),
+    Show(ShowPdos),
     /// Show the values in the PDOs of a node as they arrive, by its own mapping
     Watch(WatchPdo),
     Plan(setup::PlanPdos),
     Apply(setup::ApplyPdos),
-}
-
-#[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  ferrodrive pdo show 4\n  ferrodrive --bus can0 pdo show")]
-struct Show {
-    /// Node-IDs (default: every node on the bus)
-    #[arg(value_parser = node)]
-    nodes: Vec<NodeId>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -71,18 +59,6 @@ struct WatchPdo {
 
 /// Nothing happens on an embedded bus by itself.
 const EMBEDDED_DURATION: Duration = Duration::from_secs(1);
-
-/// How the PDOs of nodes are configured.
-#[derive(Debug, Serialize)]
-struct PdoList {
-    nodes: Vec<OfNode>,
-}
-
-#[derive(Debug, Serialize)]
-struct OfNode {
-    node: u8,
-    pdos: Vec<PdoSetup>,
-}
 
 /// A PDO that came.
 #[derive(Debug, Serialize)]
@@ -115,33 +91,6 @@ impl Pdo {
             PdoCommand::Plan(plan) => format.print(&plan.run(context).await?).map_err(Failure::of_stdout),
             PdoCommand::Apply(apply) => format.print(&apply.run(context).await?).map_err(Failure::of_stdout),
         }
-    }
-}
-
-impl Show {
-    async fn run(&self, context: &Context) -> Result<PdoList, Failure> {
-        let mut nodes = self.nodes.clone();
-        if nodes.is_empty() {
-            let asked = |count| context.progress.count(format!("asked {count} of 127"));
-            nodes.extend(context.network.scan(context.timeout(), asked).await.iter().map(|found| found.node));
-        }
-        let mut list = Vec::new();
-        let mut heard = silent::HeardIds::listen(context);
-        heard.long_enough(context).await;
-        for node in nodes {
-            context.progress.show(format!("node {node}: reading its PDOs"));
-            let drive = context.drive(node).await?;
-            let pdos = drive.pdos().await?;
-            heard.take();
-            let row = |(config, cob_id): &(PdoConfig, CobId)| {
-                PdoSetup::new(drive.description(), config, *cob_id, &heard.why(context, &drive, config, *cob_id))
-            };
-            list.push(OfNode { node: node.raw(), pdos: pdos.iter().map(row).collect() });
-        }
-        if list.is_empty() {
-            return Err(Failure::new("no node answers on the bus").of_kind("no_node").next("ferrodrive scan"));
-        }
-        Ok(PdoList { nodes: list })
     }
 }
 
@@ -218,45 +167,6 @@ impl PdoLine {
             stamp,
             remark,
         }
-    }
-}
-
-impl Report for PdoList {
-    fn text(&self, paint: Paint) -> String {
-        let mut table = Table::new(&["node", "pdo", "id", "type", "when", "inhibit", "timer", "carries"]);
-        let ms = |time: Option<f64>| time.map_or_else(|| "-".into(), |time| format!("{time} ms"));
-        for (of_node, row) in self.nodes.iter().flat_map(|of_node| of_node.pdos.iter().map(move |row| (of_node, row))) {
-            table.row([
-                of_node.node.to_string(),
-                row.pdo.clone(),
-                row.id_text(),
-                row.transmission.to_string(),
-                row.when.clone(),
-                ms(row.inhibit_ms),
-                ms(row.event_ms),
-                row.carries(),
-            ]);
-        }
-        let mut lines = vec![table.plain(paint)];
-        lines.extend(self.nodes.iter().flat_map(OfNode::why_silent));
-        lines.join("\n")
-    }
-}
-
-impl OfNode {
-    /// Each reason once, with the PDOs that it keeps away.
-    fn why_silent(&self) -> Vec<String> {
-        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-        for row in &self.pdos {
-            for reason in &row.silent {
-                match reasons.iter_mut().find(|(known, _)| known == reason) {
-                    Some((_, pdos)) => pdos.push(&row.pdo),
-                    None => reasons.push((reason, vec![&row.pdo])),
-                }
-            }
-        }
-        let line = |(reason, pdos): (&str, Vec<&str>)| format!("node {} {}: {reason}", self.node, pdos.join(", "));
-        reasons.into_iter().map(line).collect()
     }
 }
 

@@ -6,10 +6,9 @@ use master::drive::{Limits, Setting};
 use serde::Serialize;
 
 use super::departures::DepartureList;
+use super::drive::guessed;
 use crate::context::Context;
 use crate::failure::Failure;
-use crate::output::Report;
-use console::command::drive::guessed;
 use plot::Paint;
 use plot::Table;
 use words::models::{Description, is_from_file, known, resolve};
@@ -18,25 +17,25 @@ use words::object::{ObjectArg, object};
 use words::unresolved::Unresolved;
 
 /// List the object dictionary of a model or of a node; without one, the models
-#[derive(clap::Args)]
+#[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  ferrodrive objects\n  ferrodrive objects zlac8030l\n  ferrodrive objects 4 velocity\n  ferrodrive objects zlim42c homing\n  \
         ferrodrive objects zlac8030l,firmware=2.01 202F\n  ferrodrive objects zlac8030l --departures"
 )]
-pub(crate) struct Objects {
+pub struct Objects {
     /// Model (e.g. zlac8030l), data sheet (FILE.eds) or node-ID
     #[arg(value_name = "MODEL|FILE.eds|NODE", value_parser = whose)]
-    pub(crate) whose: Option<Whose>,
+    pub whose: Option<Whose>,
     /// Show only objects with this index, or with this word in name, title or meaning
     search: Vec<String>,
     /// Show where the model departs from CiA 301 and CiA 402, and what a program written for them has to do
     #[arg(long, conflicts_with = "search", requires = "whose")]
-    pub(crate) departures: bool,
+    pub departures: bool,
 }
 
 /// Whose dictionary.
-#[derive(Clone, Copy)]
-pub(crate) enum Whose {
+#[derive(Clone, Copy, Debug)]
+pub enum Whose {
     /// A model's.
     Model(&'static Description),
     /// That of a node, whose model is to be found out.
@@ -52,7 +51,7 @@ fn whose(text: &str) -> Result<Whose, Unresolved> {
 
 /// The models that are known by name.
 #[derive(Debug, Serialize)]
-pub(crate) struct ModelList {
+pub struct ModelList {
     models: Vec<ModelRow>,
 }
 
@@ -71,7 +70,8 @@ struct ModelRow {
 }
 
 impl ModelList {
-    pub(crate) fn new() -> Self {
+    /// All of them.
+    pub fn of_all() -> Self {
         let row = |model: &Description| ModelRow {
             name: model.name,
             title: model.title,
@@ -84,8 +84,9 @@ impl ModelList {
     }
 }
 
-impl Report for ModelList {
-    fn text(&self, paint: Paint) -> String {
+impl ModelList {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let mut table = Table::new(&["model", "what it is", "node-ID", "kbit/s", "known from"]);
         let delivered = |number: Option<u32>| number.map_or_else(String::new, |number| number.to_string());
         for row in &self.models {
@@ -99,7 +100,7 @@ impl Report for ModelList {
 
 /// The rows found.
 #[derive(Debug, Serialize)]
-pub(crate) struct ObjectList {
+pub struct ObjectList {
     model: &'static str,
     /// The model, if a node was asked and its model is a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -205,15 +206,29 @@ struct Meaning {
 }
 
 impl Objects {
+    /// What was asked for, as lines for people.
+    ///
+    /// # Errors
+    /// The model of a node is not known, no object fits; those of SDO.
+    pub async fn text(&self, context: &Context, paint: Paint) -> Result<String, Failure> {
+        Ok(match self.whose {
+            None => ModelList::of_all().text(paint),
+            Some(Whose::Model(model)) if self.departures => DepartureList::of(model, None).text(paint),
+            Some(Whose::Node(node)) if self.departures => self.departures_of_node(context, node).await?.text(paint),
+            Some(Whose::Model(model)) => self.list(model)?.text(paint),
+            Some(Whose::Node(node)) => self.of_node(context, node).await?.text(paint),
+        })
+    }
+
     /// Where a node's model departs from the standards.
-    pub(crate) async fn departures_of_node(&self, context: &Context, node: NodeId) -> Result<DepartureList, Failure> {
+    pub async fn departures_of_node(&self, context: &Context, node: NodeId) -> Result<DepartureList, Failure> {
         let drive = context.known_drive(node).await?;
         let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
         Ok(DepartureList::of(model, guessed(&drive)))
     }
 
     /// Searches the table of a node's model.
-    pub(crate) async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
+    pub async fn of_node(&self, context: &Context, node: NodeId) -> Result<ObjectList, Failure> {
         let drive = context.known_drive(node).await?;
         let model = drive.description().ok_or_else(|| Failure::unknown_model(node))?;
         let mut list = ObjectList { guess: guessed(&drive), ..self.list(model)? };
@@ -227,7 +242,7 @@ impl Objects {
     }
 
     /// Searches the table of `model`.
-    pub(crate) fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
+    pub fn list(&self, model: &'static Description) -> Result<ObjectList, Failure> {
         let rows = model.dictionary.rows();
         let wanted = |row: &&Entry| self.search.iter().all(|word| matches(row, word));
         let objects: Vec<TableRow> = rows.iter().filter(wanted).map(TableRow::new).collect();
@@ -348,8 +363,9 @@ impl NumberBounds {
     }
 }
 
-impl Report for ObjectList {
-    fn text(&self, paint: Paint) -> String {
+impl ObjectList {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let mut table = Table::new(&["object", "name", "type", "access", "default", "unit", "accepts"]);
         for row in &self.objects {
             table.row([

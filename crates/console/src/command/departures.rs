@@ -2,14 +2,13 @@
 
 use serde::Serialize;
 
-use crate::output::Report;
 use plot::Paint;
 use plot::Table;
 use words::models::Description;
 
 /// All departures of a model.
 #[derive(Debug, Serialize)]
-pub(crate) struct DepartureList {
+pub struct DepartureList {
     model: &'static str,
     /// The model, if a node was asked and its model is a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -31,7 +30,7 @@ struct DepartureRow {
 
 impl DepartureList {
     /// Those of `model`.
-    pub(crate) fn of(model: &'static Description, guess: Option<&'static str>) -> Self {
+    pub fn of(model: &'static Description, guess: Option<&'static str>) -> Self {
         let departures = model.departures(devices::all()).map(|departure| DepartureRow {
             departure: departure.key(),
             object: departure.object().map(|object| object.to_string()),
@@ -47,8 +46,9 @@ impl DepartureList {
     }
 }
 
-impl Report for DepartureList {
-    fn text(&self, paint: Paint) -> String {
+impl DepartureList {
+    /// As lines for people.
+    pub fn text(&self, paint: Paint) -> String {
         let mut table = Table::new(&["object", "what is so", "what to do"]);
         for row in &self.departures {
             table.row([row.object.as_deref().unwrap_or("-"), &row.what, &row.remedy]);
