@@ -1,12 +1,13 @@
 //! A record as a file of the other kind.
 
+use std::collections::BTreeMap;
 use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use can::Instant;
 
 use super::piece::Kind;
-use super::read::{CsvLines, note};
+use super::read::{CsvLines, note, read};
 use super::record::Record;
 
 /// An MCAP file with the contents of a CSV file. A subject without values in a line has no message of that time:
@@ -25,6 +26,37 @@ pub fn mcap_of_csv(bytes: &[u8]) -> Result<Vec<u8>, String> {
             record.mark(&mark).map_err(broken)?;
         }
     }
+    record.finish().map_err(broken)?;
+    Ok(memory.into_bytes())
+}
+
+/// A CSV file with the contents of an MCAP file: a line for each time of a sample, with the values that are of that time; and what
+/// happened. CSV has no place for frames.
+///
+/// # Errors
+/// Not an MCAP file with a record, in a sentence.
+pub fn csv_of_mcap(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    let recorded = read(Kind::Mcap, bytes)?;
+    let mut lines: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (place, series) in recorded.series.iter().enumerate() {
+        for (at_s, value) in &series.points {
+            let line = lines.entry((at_s * 1e9).round() as u64);
+            line.or_insert_with(|| vec![f64::NAN; recorded.series.len()])[place] = *value;
+        }
+    }
+    let columns: Vec<_> = recorded.series.iter().map(|series| series.column.clone()).collect();
+    let memory = Memory::default();
+    let broken = |error: io::Error| error.to_string();
+    let mut record = Record::exact(Kind::Csv, Box::new(memory.clone()), &columns).map_err(broken)?;
+    let mut marks = recorded.marks.iter().peekable();
+    for (nanos, values) in &lines {
+        let at = Instant::from_nanos(*nanos);
+        while let Some(mark) = marks.next_if(|mark| mark.at <= at) {
+            record.mark(mark).map_err(broken)?;
+        }
+        record.row(at, values).map_err(broken)?;
+    }
+    marks.try_for_each(|mark| record.mark(mark)).map_err(broken)?;
     record.finish().map_err(broken)?;
     Ok(memory.into_bytes())
 }
@@ -77,7 +109,6 @@ impl Seek for Memory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read;
 
     #[test]
     fn what_stands_in_the_csv_stands_in_the_mcap() {
@@ -99,6 +130,12 @@ mod tests {
         }
         let speed = is.series.iter().find(|series| series.column.signal == "velocity_rpm").expect("a speed");
         assert_eq!(speed.column.unit, "r/min");
+        let again = csv_of_mcap(&mcap).expect("it is one");
+        let back = read(Kind::Csv, &again).expect("CSV");
+        for name in ["4.velocity_rpm", "4.current_a", "5.606C_00"] {
+            assert_eq!(samples(&back, name), samples(&was, name), "{name}");
+        }
+        assert_eq!(back.marks, was.marks);
         // A node has no messages at the times of another.
         assert_eq!(speed.points.len(), 2);
         assert_eq!(

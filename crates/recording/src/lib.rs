@@ -31,7 +31,7 @@ mod trail;
 pub use capture::{Capture, Trace};
 pub use channels::{Channel, Channels, MESSAGE_ENCODING, SCHEMA_ENCODING, Sink};
 pub use column::{Column, Subject, columns_of_drives, ending_of, is_called, select};
-pub use convert::mcap_of_csv;
+pub use convert::{csv_of_mcap, mcap_of_csv};
 pub use picture::{overlay, picture};
 pub use piece::{Batch, Entry, Kind, Mark, Recorded, Series, Severity, Target};
 pub use read::{read, read_csv};

@@ -72,7 +72,8 @@ impl<'a> CsvLines<'a> {
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&bytes[..whole]);
         let header = reader.headers().map_err(|error| format!("not a CSV file: {error}"))?.clone();
         if !matches!(header.get(0), Some("t_s" | "time_s")) {
-            return Err("its first column is not t_s, the time in s".into());
+            let first = header.get(0).unwrap_or_default();
+            return Err(format!("its first column is not t_s, the time in s: it is '{first}'"));
         }
         let marks_at = header.iter().position(|name| name == "mark");
         let (mut columns, mut places) = (Vec::new(), Vec::new());

@@ -186,3 +186,22 @@ fn moved_by_hand_a_simulator_writes_the_same_log_and_record_to_the_byte() {
         }
     }
 }
+
+#[test]
+fn a_record_becomes_one_of_the_other_form_and_back() {
+    let directory = scratch("convert-record");
+    let path = |name: &str| directory.join(name).to_str().unwrap().to_owned();
+    let (csv, mcap, back) = (path("run.csv"), path("run.mcap"), path("back.csv"));
+    std::fs::write(&csv, "t_s,4.velocity_rpm,5.current_a,mark\n0,60,,\n0.001,,1.5,\n0.0025,61.25,,enabled\n").unwrap();
+    done(&["convert", &csv, &mcap]);
+    let report = done(&["--json", "convert", &mcap, &back]).json();
+    let written = std::fs::read_to_string(&back).unwrap();
+    assert_eq!(report["bytes"], written.len());
+    let header = written.lines().next().unwrap();
+    assert!(header.starts_with("t_s,4.velocity_rpm,5.current_a"), "{written}");
+    assert!(written.contains("61.25") && written.contains("enabled") && written.contains("1.5"), "{written}");
+    let again = ferrodrive(&["convert", &mcap, &back]);
+    assert!(again.status == Some(1) && again.err.contains("back.csv"), "{}", again.err);
+    let log = ferrodrive(&["convert", &path("a.log"), &path("a.csv")]);
+    assert!(log.status == Some(2) && log.err.contains("a record is NAME.csv or NAME.mcap"), "{}", log.err);
+}

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use canopen::NodeId;
 use master::Drive;
-use recording::{Column, Kind, Recorded, Subject, is_called, read_csv};
+use recording::{Column, Kind, Recorded, Series, Subject, is_called, read_csv};
 use words::document::read_bytes;
 use words::failure::Failure;
 
@@ -141,7 +141,7 @@ impl RecordedPath {
 }
 
 /// What such a file looks like.
-const FORM: &str = "its first line names the columns, t_s and a position of each axis by its node: t_s,1.angle_deg,2.angle_deg; a record \
+const FORM: &str = "its first line names the columns, divided by commas, t_s and a position of each axis by its node: t_s,1.angle_deg,2.angle_deg; a record \
                     or capture of this program with positions is one too";
 
 fn bad(name: &str, why: impl std::fmt::Display) -> Failure {
@@ -179,8 +179,24 @@ fn positions_of(name: &str, recorded: &Recorded) -> Result<Vec<(NodeId, Unit, us
             Some(_) => {}
         }
     }
-    match chosen.is_empty() {
-        true => Err(bad(name, "none of its columns has positions").next(FORM)),
-        false => Ok(chosen.into_iter().map(|(node, unit, at, _)| (node, unit, at)).collect()),
+    if chosen.is_empty() {
+        return Err(bad(name, "none of its columns has positions").next(FORM));
     }
+    // A misspelt name would leave its axis where it is while the others move.
+    let is_left = |series: &&Series| {
+        let Subject::Axis(place) = &series.column.subject else { return false };
+        let has_values = series.points.iter().any(|(_, value)| !value.is_nan());
+        has_values && chosen.iter().all(|(node, ..)| node.raw() != place.node)
+    };
+    if let Some(Column { subject: Subject::Axis(place), .. }) =
+        recorded.series.iter().find(is_left).map(|it| &it.column)
+    {
+        let of_node =
+            recorded.series.iter().map(|series| &series.column).filter(|it| it.subject == Subject::Axis(*place));
+        let names = of_node.map(Column::name).collect::<Vec<_>>().join(", ");
+        let node = place.node;
+        return Err(bad(name, format!("it has {names} of node {node}, and no positions of it"))
+            .next(format!("call its positions {node}.angle_deg, or take the columns of node {node} out")));
+    }
+    Ok(chosen.into_iter().map(|(node, unit, at, _)| (node, unit, at)).collect())
 }

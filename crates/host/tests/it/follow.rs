@@ -216,6 +216,8 @@ fn what_is_not_a_path_is_refused_with_its_place_and_a_remedy() {
         ("time,1.angle_deg\n0,0\n1,1\n", "its first column is not t_s", "t_s,1.angle_deg,2.angle_deg"),
         ("t_s,angle\n0,0\n1,1\n", "'angle' is not of the form NODE.SIGNAL", "its first line names the columns"),
         ("t_s,1.velocity_rpm\n0,0\n1,1\n", "none of its columns has positions", "t_s,1.angle_deg"),
+        ("t_s,1.angle_deg,2.angle\n0,0,0\n1,1,1\n", "it has 2.angle of node 2", "2.angle_deg, or take"),
+        ("t_s;1.angle_deg\n0;0\n", "it is 't_s;1.angle_deg'", "divided by commas"),
         ("t_s,arm.angle_deg\n0,0\n1,1\n", "none of its columns has positions", "t_s,1.angle_deg"),
         ("t_s,1.angle_m\n0,0\n1,1\n", "none of its columns has positions", "t_s,1.angle_deg"),
         ("t_s,5.2.angle_deg\n0,0\n1,1\n", "5.2.angle_deg is not the first axis", "take the column out"),
