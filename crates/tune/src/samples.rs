@@ -114,6 +114,18 @@ impl Samples {
         }
     }
 
+    /// The first of them.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Self {
+        let begin = |values: &[f64]| values[..count.min(values.len())].to_vec();
+        Self {
+            period_s: self.period_s,
+            set_point_rad_s: begin(&self.set_point_rad_s),
+            current_a: begin(&self.current_a),
+            position_rad: begin(&self.position_rad),
+        }
+    }
+
     /// One more sample.
     pub fn push(&mut self, set_point_rad_s: f64, current_a: f64, position_rad: f64) {
         self.set_point_rad_s.push(set_point_rad_s);

@@ -8,7 +8,7 @@ use cia402::object::POSITION_ACTUAL_VALUE;
 use cia402::{ModeOfOperation, RAD_S_PER_RPM};
 use devices::Loops;
 use master::core::{PdoMap, Signal};
-use master::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest};
+use master::cyclic::{CyclicDrive, CyclicOptions, CyclicState, Demand, NotAtRest, Refusal};
 use master::pdo::{PdoConfig, TimerUnits, TransmissionType};
 use master::units::{Amperes, Rpm};
 use master::{Drive, Network};
@@ -16,6 +16,7 @@ use serde::Serialize;
 use tune::{Excitation, Samples, SteadyRun};
 use words::failure::{Failure, both};
 
+use super::gaps::Gaps;
 use crate::stopping::bring_to_rest;
 
 /// What the motion of a measurement keeps to. Beyond one of them it is stopped.
@@ -81,6 +82,8 @@ pub struct Measurement {
     pub amplitude_rpm: f64,
     /// By how much the gains were lowered meanwhile: 1 for not at all.
     pub gain_share: f64,
+    /// Samples that did not come in their cycle, and were put between their neighbours.
+    pub filled: usize,
 }
 
 /// How far a shaft went since it was first looked at, over as many benches as a measurement takes.
@@ -207,6 +210,7 @@ pub struct Bench {
     pub gain_share: f64,
     /// What was asked for last, r/min.
     asked_rpm: f64,
+    gaps: Gaps,
     /// Its guard began with this measurement, and ends with it.
     is_guarded: bool,
 }
@@ -260,6 +264,7 @@ impl Bench {
             excursion,
             gain_share: 1.0,
             asked_rpm: 0.0,
+            gaps: Gaps::default(),
             is_guarded,
         };
         it.network.sync(Some(period));
@@ -270,15 +275,17 @@ impl Bench {
         }
     }
 
-    /// The sample of a cycle that came, and is the next one.
-    fn in_time(&self, shown: Option<(i64, i64)>, before: &mut Option<u64>) -> Result<(i64, i64), Failure> {
-        let cycle = self.network.cycle().map(|cycle| cycle.number);
-        let is_late = before.zip(cycle).is_some_and(|(before, now)| now != before + 1);
-        *before = cycle;
-        shown.filter(|_| !is_late).ok_or_else(|| {
-            let reason = "a sample is missing: this program was late, or the bus has no room for the drive's TPDOs";
-            self.stopped(reason).of_kind(LATE_KIND).next("give --realtime (Linux), or a longer --period")
-        })
+    /// That more samples did not come in their cycles than may be missing.
+    fn late(&self) -> Failure {
+        self.late_by("a sample is missing: this program was late, or the bus has no room for the drive's TPDOs")
+    }
+
+    fn late_by(&self, reason: impl std::fmt::Display) -> Failure {
+        self.stopped(reason).of_kind(LATE_KIND).next("give --realtime (Linux), or a longer --period")
+    }
+
+    fn cycle(&self) -> Option<u64> {
+        self.network.cycle().map(|cycle| cycle.number)
     }
 
     /// The drive follows within [`ENABLING_S`].
@@ -287,17 +294,19 @@ impl Bench {
         for _ in 0..SKIPPED {
             self.network.next_sync().await.map_err(|error| self.stopped(error))?;
         }
-        let (mut before, mut seen) = (None, Ok((0, 0)));
+        let (mut gaps, mut is_late) = (Gaps::default(), false);
         for _ in 0..self.cycles(ENABLING_S) {
             let (state, shown) = self.step(Demand::Hold).await?;
             if state.follows {
                 return Ok(());
             }
-            seen = seen.and(self.in_time(shown, &mut before));
+            is_late |= gaps.cycles_before(self.cycle()) > 0 || shown.is_none();
+        }
+        if is_late {
+            return Err(self.late());
         }
         let id = self.drive.node();
-        let late = || self.stopped("it was not enabled within 2 s").next(format!("ferrodrive explain {id}"));
-        Err(seen.err().unwrap_or_else(late))
+        Err(self.stopped("it was not enabled within 2 s").next(format!("ferrodrive explain {id}")))
     }
 
     fn cycles(&self, time_s: f64) -> usize {
@@ -326,7 +335,8 @@ impl Bench {
     /// A bound was reached, the drive refused, or a sample is missing. The drive is to be [`stop`](Self::stop)ped.
     pub async fn follow(&mut self, speeds_rpm: impl IntoIterator<Item = f64>) -> Result<Samples, Failure> {
         let mut samples = Samples { period_s: self.period.as_secs_f64(), ..Samples::default() };
-        self.follow_on(speeds_rpm, &mut samples, &mut None).await?;
+        self.gaps.begin();
+        self.follow_on(speeds_rpm, &mut samples).await?;
         Ok(samples)
     }
 
@@ -335,20 +345,28 @@ impl Bench {
         &mut self,
         speeds_rpm: impl IntoIterator<Item = f64>,
         samples: &mut Samples,
-        before: &mut Option<u64>,
     ) -> Result<(), Failure> {
-        for asked in speeds_rpm {
+        let mut speeds_rpm = speeds_rpm.into_iter();
+        loop {
+            // The time of some has passed.
+            let Some(asked) = speeds_rpm.nth(self.gaps.late()) else { return Ok(()) };
             let (state, shown) = self.step(Demand::Velocity(Rpm(asked))).await?;
             self.asked_rpm = asked;
-            if let Some(refusal) = state.refused {
-                return Err(self.stopped(refusal));
+            match state.refused {
+                Some(refusal @ Refusal::Stopped(_)) => return Err(self.late_by(refusal)),
+                Some(refusal) => return Err(self.stopped(refusal)),
+                None => {}
             }
-            let (position, current) = self.in_time(shown, before)?;
-            let (turns, current_a) = (position as f64 / self.counts_per_turn, current as f64 * self.current_per_count);
-            self.keep_bounds(turns, current_a)?;
-            samples.push(asked * RAD_S_PER_RPM, current_a, turns * std::f64::consts::TAU);
+            let shown = shown.map(|(position, current)| {
+                (position as f64 / self.counts_per_turn, current as f64 * self.current_per_count)
+            });
+            if let Some((turns, current_a)) = shown {
+                self.keep_bounds(turns, current_a)?;
+            }
+            let shown = shown.map(|(turns, current_a)| (current_a, turns * std::f64::consts::TAU));
+            let unseen = self.gaps.cycles_before(self.cycle());
+            self.gaps.take(samples, unseen, (asked * RAD_S_PER_RPM, shown)).ok_or_else(|| self.late())?;
         }
-        Ok(())
     }
 
     fn keep_bounds(&mut self, turns: f64, current_a: f64) -> Result<(), Failure> {
@@ -414,17 +432,20 @@ impl Bench {
         self.excursion.peak_a = self.excursion.peak_a.max(before_a);
         let amplitude_rpm = (small_rpm * factor).min(LARGEST * self.bounds.speed_rpm);
         let mut samples = Samples { period_s: self.period.as_secs_f64(), ..Samples::default() };
-        let mut before = None;
+        self.gaps.begin();
         for period in 1..=PERIODS {
             let values = (0..excitation.len()).map(|n| bias + amplitude_rpm * excitation.at(n));
-            self.follow_on(values, &mut samples, &mut before).await?;
+            self.follow_on(values, &mut samples).await?;
             // After the last one all of it is judged.
             if (LOOKED_AT..PERIODS).contains(&period) {
-                self.keep_coherence(&samples.last(LOOKED_AT * excitation.len()), excitation)?;
+                let so_far = samples.first(period * excitation.len());
+                self.keep_coherence(&so_far.last(LOOKED_AT * excitation.len()), excitation)?;
             }
         }
-        let (excitation, gain_share) = (excitation.clone(), self.gain_share);
-        Ok(Measurement { runs, samples, excitation, amplitude_rpm, gain_share })
+        // One whose time had passed may be behind the last period.
+        let samples = samples.first(PERIODS * excitation.len());
+        let (excitation, gain_share, filled) = (excitation.clone(), self.gain_share, self.gaps.filled());
+        Ok(Measurement { runs, samples, excitation, amplitude_rpm, gain_share, filled })
     }
 
     /// What the shaft did in the last periods follows from what was asked for.

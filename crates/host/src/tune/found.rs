@@ -23,6 +23,8 @@ pub struct Found {
     pub own: Loop,
     /// The share of the drive's own gains with which it was measured.
     pub gain_share: f64,
+    /// Samples that were put between their neighbours: they did not come in their cycle.
+    pub filled: usize,
     /// Torque per ampere: the motor's, from its data.
     pub torque_constant_nm_a: f64,
 }
@@ -61,6 +63,7 @@ impl Found {
             response: Some(response),
             own,
             gain_share: measured.gain_share,
+            filled: measured.filled,
             torque_constant_nm_a,
         })
     }

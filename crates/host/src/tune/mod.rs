@@ -13,6 +13,7 @@ mod bench;
 mod commanded;
 mod curves;
 mod found;
+mod gaps;
 mod line;
 mod measure;
 mod moves;

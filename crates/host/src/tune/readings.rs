@@ -398,7 +398,16 @@ impl Shaft<'_> {
         let per_a = 1.0 / torque_constant_nm_a;
         let friction =
             Friction { dry_a: dry_nm * per_a, viscous_a_s_rad: viscous_nm_s * per_a, load_a: 0.0, off_a: 0.0 };
-        Found { response: None, mechanics, plant: mechanics, friction, own, gain_share: 1.0, torque_constant_nm_a }
+        Found {
+            response: None,
+            mechanics,
+            plant: mechanics,
+            friction,
+            own,
+            gain_share: 1.0,
+            filled: 0,
+            torque_constant_nm_a,
+        }
     }
 }
 

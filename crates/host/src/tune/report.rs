@@ -11,6 +11,7 @@ use master::cyclic::CyclicOptions;
 use plot::{Colour, Figure, Panel, Poster, Style, Trace};
 use serde::Serialize;
 use tune::{Margins, Mechanics, Objective, Unusable};
+use words::counted;
 use words::failure::{Failure, both};
 
 use crate::capture::Restorer;
@@ -446,6 +447,10 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request, period: Option<D
     let mut notes = Vec::new();
     if let (None, Some(period)) = (request.period, period.filter(|period| *period > SAMPLE_PERIODS[0])) {
         notes.push(format!("it was sampled every {period:?}: in a shorter period samples were missing"));
+    }
+    if found.filled > 0 {
+        let samples = counted(found.filled, "sample");
+        notes.push(format!("{samples} did not come in their cycle, and were put between their neighbours"));
     }
     if found.response.is_none() {
         notes.push(

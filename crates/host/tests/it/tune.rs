@@ -220,7 +220,7 @@ fn a_drive_that_is_lost_in_a_measurement_is_said_not_to_have_been_seen_to_stand_
     assert!(failure.what.contains("not everything could be put back"), "{failure:?}");
     let text = failure.to_string();
     assert!(text.contains("was not seen to stand: it may still be moving"), "{text}");
-    assert!(text.contains("a sample is missing"), "{text}");
+    assert!(text.contains("its TPDO did not come"), "{text}");
 }
 
 /// How often the drive is enabled for it, with lower gains or new ones, makes no difference to the shaft.

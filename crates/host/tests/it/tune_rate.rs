@@ -44,6 +44,26 @@ fn a_drive_is_sampled_in_the_shortest_period_in_which_nothing_is_missing_and_tak
     }
 }
 
+/// Its plug is loose for 3 ms once in the excitation: a sample or two stay away.
+#[test]
+fn a_sample_that_is_missing_once_is_no_reason_to_measure_again() {
+    let (mut world, drive) = slow(Bitrate::M1);
+    let station = world.drive_id(1).unwrap();
+    let (period, restorer) = (Some(Duration::from_millis(2)), Restorer::of(&drive));
+    let request = Request { period, ..request() };
+    let mut run = Box::pin(tune((&drive, &restorer), &request, &(), std::future::ready(false)));
+    let out_of_time = |ended| matches!(ended, Err(sim::BlockOnError::OutOfTime { .. }));
+    assert!(out_of_time(sim::block_on_for(&mut world, Duration::from_secs(14), &mut run).map(|_| ())));
+    world.cut(station);
+    assert!(out_of_time(sim::block_on_for(&mut world, Duration::from_millis(3), &mut run).map(|_| ())));
+    world.join(station);
+    let report = sim::block_on(&mut world, run).unwrap().unwrap();
+    let said = report.notes.iter().filter(|note| note.contains("did not come in their cycle")).count();
+    assert_eq!((report.period_ms, said), (Some(2.0), 1), "{:?}", report.notes);
+    let rotor = motor_of(drive.description().unwrap()).unwrap().rotor.inertia_kg_m2;
+    assert!(relative(report.inertia_kg_m2, rotor + 0.02) < 0.05, "{}", report.inertia_kg_m2);
+}
+
 #[test]
 fn a_period_in_which_samples_are_missing_is_refused_before_the_shaft_has_gone_far() {
     let (mut world, drive) = slow(Bitrate::K500);
@@ -56,7 +76,7 @@ fn a_period_in_which_samples_are_missing_is_refused_before_the_shaft_has_gone_fa
     assert_eq!(failure.kind, "no_rate", "{failure:?}");
     assert!(failure.to_string().contains("a sample is missing") && failure.next[0].contains("longer --period"));
     let report = world.report(1).unwrap();
-    // 4096 counts are a turn.
-    assert!((report.position - stood).abs() < 4096, "{report:?}");
+    // 4096 counts are a turn; the whole measurement takes more than ten. The first sample that is missing may be a lone one.
+    assert!((report.position - stood).abs() < 2 * 4096, "{report:?}");
     assert_ne!(report.state, Some(cia402::PowerState::OperationEnabled));
 }
