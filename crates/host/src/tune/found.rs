@@ -25,6 +25,8 @@ pub struct Found {
     pub gain_share: f64,
     /// Samples that were put between their neighbours: they did not come in their cycle.
     pub filled: usize,
+    /// How many times larger inertia and gains are than they seem by the samples: 1 where those are close enough.
+    pub larger: f64,
     /// Torque per ampere: the motor's, from its data.
     pub torque_constant_nm_a: f64,
 }
@@ -64,8 +66,18 @@ impl Found {
             own,
             gain_share: measured.gain_share,
             filled: measured.filled,
+            larger: 1.0,
             torque_constant_nm_a,
         })
+    }
+
+    /// The same with so many times the inertia, moved by so many times the current: one that was seen too small by its samples.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let scaled = |it: Mechanics| Mechanics { gain: it.gain / factor, ..it };
+        let own =
+            Loop { proportional: self.own.proportional * factor, integral: self.own.integral * factor, ..self.own };
+        let (mechanics, plant) = (scaled(self.mechanics), scaled(self.plant));
+        Self { mechanics, plant, own, larger: self.larger * factor, ..self.clone() }
     }
 
     /// Inertia of all that turns, at the motor's shaft.

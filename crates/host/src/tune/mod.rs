@@ -25,6 +25,7 @@ mod ramps;
 mod ramps_twin;
 mod readings;
 mod report;
+mod sampled;
 mod setup;
 mod twin;
 

@@ -406,6 +406,7 @@ impl Shaft<'_> {
             own,
             gain_share: 1.0,
             filled: 0,
+            larger: 1.0,
             torque_constant_nm_a,
         }
     }

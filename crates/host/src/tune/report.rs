@@ -4,7 +4,6 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use canopen::Mux;
 use devices::Description;
 use master::Drive;
 use master::cyclic::CyclicOptions;
@@ -18,6 +17,7 @@ use crate::capture::Restorer;
 
 use super::bench::SWINGS;
 use super::measure::measure_in_time;
+use super::sampled;
 use super::{
     Bounds, Currents, Curves, Excursion, Found, Measurement, MoveRow, OutputLoad, Proposed, Reader, ResponseRow, Setup,
     Shaft, StepResponse, Trial, Twin, Unreachable, constant_of, loops_of, motor_of, speed_gains,
@@ -251,11 +251,11 @@ pub async fn find(
             let (period, measured) = both(measured, had.put_back(drive).await)?;
             let own = constant_of((model, loops), &motor, had.rated_constant());
             let constant = request.torque_constant_nm_a.or(loops.torque_constant_nm_a).unwrap_or(own);
-            let found = Found::of(&measured, &had, loops, (&motor, constant)).map_err(|error| failed(&error))?;
-            let twin = Twin::new((model, loops), &found, (&motor, own), gains_of(&had, loops));
-            let of_twin = twin.measure(&had.lowered(measured.gain_share), (period, request.bounds)).await?;
-            let (off, response) = between(&measured, &of_twin, &found.plant).map_err(|error| failed(&error))?;
-            (Some(period), found, twin, off, response)
+            let (seen, constants) = ((&measured, &had), (&motor, constant, own));
+            let how = (period, request.bounds);
+            let it = sampled::find((model, loops), seen, constants, how, failed).await?;
+            let (off, response) = between(&measured, &it.of_twin, &it.seems).map_err(|error| failed(&error))?;
+            (Some(period), it.found, it.twin, off, response)
         }
     };
     let how = (period.or(request.period).unwrap_or(SAMPLE_PERIODS[0]), request.bounds);
@@ -372,7 +372,7 @@ fn twin_with(
 ) -> Twin {
     let constant = shaft.motor.windings.torque_constant_nm_a();
     let mut twin = Twin::with_load((model, loops), load.words(), (shaft.motor, constant));
-    twin.values = gains_of(had, loops);
+    twin.values = had.gains(loops);
     twin
 }
 
@@ -420,16 +420,6 @@ impl From<&super::Gain> for GainRow {
     }
 }
 
-/// The values of the loops' objects.
-fn gains_of(setup: &Setup, loops: &devices::Loops) -> Vec<(Mux, i64)> {
-    let others = [loops.position_proportional, loops.speed_filter].into_iter().flatten().map(|it| it.object);
-    let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
-    let own = [loops.speed_proportional, loops.speed_integral.object()];
-    let rated = loops.rated.into_iter().flatten();
-    let all = own.into_iter().chain(others).chain(current).chain(rated);
-    all.filter_map(|object| Some((object, setup.had(object)?))).collect()
-}
-
 /// How far the responses of drive and twin are apart where both are coherent: per current demand, as each was measured. And both, with
 /// that of the model.
 fn between(drive: &Measurement, twin: &Measurement, model: &Mechanics) -> Result<(f64, Vec<ResponseRow>), Unusable> {
@@ -447,6 +437,12 @@ fn notes(found: &Found, proposed: &Proposed, request: &Request, period: Option<D
     let mut notes = Vec::new();
     if let (None, Some(period)) = (request.period, period.filter(|period| *period > SAMPLE_PERIODS[0])) {
         notes.push(format!("it was sampled every {period:?}: in a shorter period samples were missing"));
+    }
+    if found.larger != 1.0 {
+        notes.push(format!(
+            "between two samples the current is not seen: inertia and gains are {:.2} times what they seem, by the twin that was sampled alike",
+            found.larger
+        ));
     }
     if found.filled > 0 {
         let samples = counted(found.filled, "sample");

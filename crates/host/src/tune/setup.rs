@@ -82,6 +82,15 @@ impl Setup {
         Some(i64::from_le_bytes(raw))
     }
 
+    /// The values of the loops' objects.
+    pub(super) fn gains(&self, loops: &Loops) -> Vec<(Mux, i64)> {
+        let others = [loops.position_proportional, loops.speed_filter].into_iter().flatten().map(|it| it.object);
+        let current = loops.current.into_iter().flat_map(|(kp, ki)| [kp.object, ki.object]);
+        let rated = loops.rated.into_iter().flatten();
+        let all = speed_gains(loops).into_iter().chain(others).chain(current).chain(rated);
+        all.filter_map(|object| Some((object, self.had(object)?))).collect()
+    }
+
     /// The quotient of rated torque and rated current, N m/A, where the demand counts by them.
     pub(super) fn rated_constant(&self) -> Option<f64> {
         let [torque, current] = self.loops.rated?.map(|object| self.had(object).filter(|value| *value > 0));

@@ -64,6 +64,23 @@ fn a_sample_that_is_missing_once_is_no_reason_to_measure_again() {
     assert!(relative(report.inertia_kg_m2, rotor + 0.02) < 0.05, "{}", report.inertia_kg_m2);
 }
 
+/// The speed loop answers to the step of a set-point with a current that has fallen by half before the next sample.
+#[test]
+fn few_samples_find_the_same_inertia_as_many() {
+    for period_ms in [5, 10] {
+        let (mut world, drive) = slow(Bitrate::M1);
+        let period = Some(Duration::from_millis(period_ms));
+        let (request, restorer, mut excursion) =
+            (Request { period, ..request() }, Restorer::of(&drive), Excursion::default());
+        let run = find((&drive, &restorer), &request, &mut excursion);
+        let (report, _) = sim::block_on(&mut world, run).unwrap().unwrap();
+        let rotor = motor_of(drive.description().unwrap()).unwrap().rotor.inertia_kg_m2;
+        let off = relative(report.inertia_kg_m2, rotor + 0.02);
+        assert!(off < 0.05, "{period_ms} ms: {} kg m²", report.inertia_kg_m2);
+        assert!(report.twin_off < 0.1, "{period_ms} ms: the twin is {} off", report.twin_off);
+    }
+}
+
 #[test]
 fn a_period_in_which_samples_are_missing_is_refused_before_the_shaft_has_gone_far() {
     let (mut world, drive) = slow(Bitrate::K500);
