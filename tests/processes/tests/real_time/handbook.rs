@@ -112,7 +112,7 @@ const FOLLOWED: [(&str, usize); 18] = [
     ("ci.md", 1),
     ("test-your-software.md", 10),
     ("logs.md", 11),
-    ("configure-a-drive.md", 13),
+    ("configure-a-drive.md", 14),
     ("two-axes-from-a-test.md", 0),
     ("add-an-object.md", 0),
     ("add-a-drive.md", 2),
@@ -208,7 +208,9 @@ fn every_command_of_the_page_on_other_makers_ends_well() {
 fn every_command_of_the_page_on_parameters_ends_well() {
     let folder = scratch("handbook_params");
     std::fs::create_dir(folder.join("examples")).unwrap();
-    std::fs::copy(root().join("examples/machine.toml"), folder.join("examples/machine.toml")).unwrap();
+    for file in ["examples/machine.toml", "examples/base.toml"] {
+        std::fs::copy(root().join(file), folder.join(file)).unwrap();
+    }
     follows("configure-a-drive.md", follow_in("configure-a-drive.md", &folder));
 }
 
