@@ -50,20 +50,24 @@ pub(super) async fn find(
     let lowered = had.lowered(measured.gain_share);
     // By its logarithm: what is to become 0, and where, the last time.
     let (mut log, mut before) = (0.0_f64, None::<(f64, f64)>);
-    for left in (0..MOST).rev() {
+    let mut made = 0;
+    loop {
         let found = first.scaled(log.exp());
         let twin = Twin::new((model, loops), &found, (motor, own), had.gains(loops));
         let of_twin = twin.measure(&lowered, (period, bounds)).await?;
+        made += 1;
         // The twin's torque per ampere is its own. Of one that cannot be found the drive's is all that there is.
         let seems = Found::of(&of_twin, had, loops, (motor, own));
         let off = seems.map_or(0.0, |found| (found.mechanics.gain / first.mechanics.gain).ln());
-        if off.abs() < if before.is_none() { BEGINS } else { ALIKE } || left == 0 {
-            return Ok(Sampled { found, twin, of_twin, seems: first.plant });
-        }
+        let alike = if before.is_none() { BEGINS } else { ALIKE };
         // The secant; at first as if the share were the same whatever the inertia is.
         let slope = before.map_or(-1.0, |(log_before, off_before)| (off - off_before) / (log - log_before));
-        before = Some((log, off));
-        log = (log - off / slope).clamp(-MOST_LOG, MOST_LOG);
+        let next = (log - off / slope).clamp(-MOST_LOG, MOST_LOG);
+        // At its bound nothing more can be found; nor from a gain that has no logarithm.
+        let is_last = made == MOST || next == log || !next.is_finite();
+        if off.abs() < alike || is_last {
+            return Ok(Sampled { found, twin, of_twin, seems: first.plant });
+        }
+        (before, log) = (Some((log, off)), next);
     }
-    Err(failed(&"no twin was made"))
 }

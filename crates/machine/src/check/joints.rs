@@ -130,37 +130,41 @@ fn worst_pose(arm: &ArmModel, joint: usize, ways: &[RangeInclusive<f64>]) -> (Ve
         data.angle_rad[..pose.len()].copy_from_slice(pose);
         arm.gravity_torque_nm(&data)[joint]
     };
+    let begin = |start: u32, (place, way): (usize, &RangeInclusive<f64>)| {
+        let middle = 0.5 * (way.start() + way.end());
+        if start >> place & 1 == 0 { middle } else { (middle + FRAC_PI_2).min(*way.end()) }
+    };
     let mut worst = (Vec::new(), -1.0);
     for sign in [1.0, -1.0] {
         for start in 0..1_u32 << ways.len() {
-            let begin = |(place, way): (usize, &RangeInclusive<f64>)| {
-                let middle = 0.5 * (way.start() + way.end());
-                if start >> place & 1 == 0 { middle } else { (middle + FRAC_PI_2).min(*way.end()) }
-            };
-            let mut pose: Vec<_> = ways.iter().enumerate().map(begin).collect();
-            let mut found_nm = sign * torque_nm(&pose);
-            loop {
-                for (place, way) in ways.iter().enumerate() {
-                    let mut at = |angle: f64| {
-                        pose[place] = angle;
-                        sign * torque_nm(&pose)
-                    };
-                    let best = highest_of_sine(&mut at, way);
-                    pose[place] = best;
-                }
-                let now_nm = sign * torque_nm(&pose);
-                let gained = now_nm > found_nm + 1e-9;
-                found_nm = now_nm;
-                if !gained {
-                    break;
-                }
-            }
-            if found_nm > worst.1 {
-                worst = (pose, found_nm);
+            let pose = ways.iter().enumerate().map(|way| begin(start, way)).collect();
+            let found = climbed(pose, ways, |pose| sign * torque_nm(pose));
+            if found.1 > worst.1 {
+                worst = found;
             }
         }
     }
     worst
+}
+
+/// The pose from here up to where no angle alone gains anything, and the value there.
+fn climbed(mut pose: Vec<f64>, ways: &[RangeInclusive<f64>], value: impl Fn(&[f64]) -> f64) -> (Vec<f64>, f64) {
+    let mut found = value(&pose);
+    loop {
+        for (place, way) in ways.iter().enumerate() {
+            let mut at = |angle: f64| {
+                pose[place] = angle;
+                value(&pose)
+            };
+            pose[place] = highest_of_sine(&mut at, way);
+        }
+        let now = value(&pose);
+        let gains = now > found + 1e-9;
+        if !gains {
+            return (pose, now);
+        }
+        found = now;
+    }
 }
 
 /// Where `a cos x + b sin x + c` is highest on a way.

@@ -70,8 +70,8 @@ struct Diff {
     /// Node-ID or file
     #[arg(value_name = "NODE|FILE", value_parser = node_or_file)]
     first: NodeOrFile,
-    /// Node-ID (after one) or file; what depends on the node-ID is compared as of the first
-    /// node, and node-ID and bit rate are left out
+    /// Node-ID (after a node) or file. Of two nodes, what depends on the node-ID is compared as the first one's, and node-ID and bit rate
+    /// are left out
     #[arg(value_name = "NODE|FILE", value_parser = node_or_file)]
     second: NodeOrFile,
 }
