@@ -30,6 +30,7 @@
 //! Deliberately absent: units of any maker's parameters. What one count of a gain is worth is found from the samples
 //! ([`Loop`]).
 
+mod answer;
 mod bode;
 mod controller;
 mod design;
@@ -44,6 +45,7 @@ mod samples;
 /// Speed per current at one frequency.
 pub use realfft::num_complex::Complex;
 
+pub use answer::Disturbance;
 pub use bode::bode;
 pub use controller::{Loop, identify_loop};
 pub use design::{Margins, Objective, Proposal, margins, propose, propose_position};

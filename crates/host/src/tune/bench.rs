@@ -154,6 +154,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 pub(super) const CURRENT_KIND: &str = "current_bound";
 /// And where a sample did not come in its cycle.
 pub(super) const LATE_KIND: &str = "no_rate";
+/// A step of the set-point, of the highest speed.
+pub(super) const STEP_SHARE: f64 = 0.25;
 /// Cycles until all TPDOs have come again.
 const SKIPPED: usize = 2;
 /// From one speed to the next, and until it is steady.
@@ -467,7 +469,7 @@ impl Bench {
     /// See [`follow`](Self::follow).
     pub async fn step_response(&mut self, most_rpm: f64, time_s: f64) -> Result<StepResponse, Failure> {
         let from = 0.5 * self.bounds.speed_rpm;
-        let step_rpm = (from, from + (0.25 * self.bounds.speed_rpm).min(most_rpm));
+        let step_rpm = (from, from + (STEP_SHARE * self.bounds.speed_rpm).min(most_rpm));
         self.approach(step_rpm.0).await?;
         self.answer(step_rpm, time_s).await
     }

@@ -2,7 +2,7 @@
 
 use canopen::Mux;
 use devices::{Description, Integral, Loops, Quantity, Scale};
-use tune::{Loop, Margins, Objective};
+use tune::{Disturbance, Loop, Margins, Objective};
 
 use super::found::Found;
 use super::setup::Setup;
@@ -10,7 +10,7 @@ use super::setup::Setup;
 /// Phase that the position loop keeps.
 const POSITION_PHASE_DEG: f64 = 60.0;
 /// Filters of the speed that are tried.
-const FILTERS_S: [f64; 4] = [0.25e-3, 1e-3, 3e-3, 8e-3];
+const FILTERS_S: [f64; 8] = [0.25e-3, 1e-3, 2e-3, 3e-3, 5e-3, 8e-3, 14e-3, 25e-3];
 
 /// An object, what it has, and what is proposed for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +83,8 @@ impl Proposed {
         found: &Found,
         setup: &Setup,
         (model, loops): (&'static Description, &Loops),
-        (objective, most_hz): (Objective, f64),
+        (objective, disturbance): (Objective, Disturbance),
+        most_hz: f64,
         with_position: bool,
     ) -> Result<Self, Unreachable> {
         let own = &found.own;
@@ -91,7 +92,7 @@ impl Proposed {
         let speed = SpeedObjects::of(setup, loops)?;
         let filters_s = speed.filters_s(own.filter_s);
         let search = |can_hold: &dyn Fn(f64, f64) -> bool| {
-            tune::propose(&found.plant, own, objective, (most_hz, highest_hz), &filters_s, can_hold)
+            tune::propose(&found.plant, own, (objective, disturbance), (most_hz, highest_hz), &filters_s, can_hold)
         };
         let out_of_range = || {
             let (proportional, integral) = (speed.proportional.0, speed.integral.0);

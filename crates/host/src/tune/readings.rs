@@ -17,7 +17,7 @@ use sim::{GearModel, MotorData};
 use tune::{Elastic, Friction, Loop, Mechanics};
 use words::failure::{Failure, both};
 
-use super::bench::{Bounds, Excursion, StepResponse};
+use super::bench::{Bounds, Excursion, STEP_SHARE, StepResponse};
 use super::found::Found;
 use super::moves::{LOOKED_AT_S, MoveRow, TrialMove};
 use super::setup::Setup;
@@ -203,7 +203,7 @@ impl Reader {
     /// See [`measure`](Self::measure).
     pub async fn step_response(&mut self, most_rpm: f64, time: Duration) -> Result<StepResponse, Failure> {
         let from = 0.5 * self.bounds.speed_rpm;
-        let to = from + (0.25 * self.bounds.speed_rpm).min(most_rpm);
+        let to = from + (STEP_SHARE * self.bounds.speed_rpm).min(most_rpm);
         let mut answers = Vec::new();
         // The last one forward: a load comes on at that speed.
         for side in STEPS {

@@ -261,15 +261,15 @@ pub async fn find(
     let how = (period.or(request.period).unwrap_or(SAMPLE_PERIODS[0]), request.bounds);
     // On the twin a large current does no harm.
     let wide = (how.0, Bounds { current_a: f64::MAX, travel_turns: f64::MAX, ..how.1 });
-    let of = |most_hz| Proposed::of(&found, &had, (model, loops), (request.objective, most_hz), request.with_position);
+    let objective = (request.objective, twin.disturbance(request.bounds));
+    let of = |most_hz| Proposed::of(&found, &had, (model, loops), objective, most_hz, request.with_position);
     let proposed = of(found.seen_hz()).map_err(|reason| match reason {
         Unreachable::Margins { .. } => {
             failed(&reason).next("ask for less, e.g. --phase-margin 30; or stiffen the coupling of the load")
         }
         _ => failed(&reason),
     })?;
-    let most_a = SWINGS * request.bounds.current_a;
-    let (proposed, calmer) = calm(proposed, of, (&twin, wide, most_a)).await?;
+    let (proposed, calmer) = calm(proposed, of, (&twin, wide, SWINGS * request.bounds.current_a)).await?;
     let after = proposed.values();
     let trials = [twin.try_out(&[], wide).await?, twin.try_out(&after, wide).await?];
     let mut report = TuneReport {

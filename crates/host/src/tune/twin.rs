@@ -5,15 +5,17 @@ use std::time::Duration;
 
 use can::Bitrate;
 use canopen::{Mux, NodeId};
+use cia402::RAD_S_PER_RPM;
 use devices::{AxisId, Description, Integral, Loops, Scale};
 use master::cyclic::CyclicOptions;
 use master::{Drive, Network};
 use serde::Serialize;
 use sim::machine::{Order, SpeedWorth, is_built_in, order};
 use sim::{Fidelity, MotorData, OUTPUT_WHEEL_SHARE, Place, StepperData, World};
+use tune::Disturbance;
 use words::failure::Failure;
 
-use super::bench::{Bench, Bounds, Excursion, Measurement, StepResponse, excitation, write};
+use super::bench::{Bench, Bounds, Excursion, Measurement, STEP_SHARE, StepResponse, excitation, write};
 use super::found::Found;
 use super::moves::{LOOKED_AT_S, MoveRow, TrialMove};
 use super::readings::{Currents, Reader};
@@ -272,6 +274,12 @@ impl Twin {
             trial.see((world.now() - began).as_secs_f64(), angle(&mut world)? - from_deg);
         }
         Ok(trial.row())
+    }
+
+    /// What it is disturbed by in a trial.
+    pub(super) fn disturbance(&self, bounds: Bounds) -> Disturbance {
+        let load_a = self.loops.demand.map_or(OUTPUT_LOAD_A, |_| LOAD_SHARE * self.loops.usual_a);
+        Disturbance { step_rad_s: STEP_SHARE * bounds.speed_rpm * RAD_S_PER_RPM, load_a }
     }
 
     async fn trial_of_samples(
