@@ -19,6 +19,7 @@ use words::plain;
 use crate::command::emcy::ShowErrors;
 use crate::command::object::ObjectReport;
 use crate::command::objects::Objects;
+use crate::command::params::{DiffNodes, ShowParameters, text_of_differences, text_of_parameters};
 use crate::command::pdo::ShowPdos;
 use crate::command::read::Read;
 use crate::command::{Command, CommandEffect};
@@ -54,6 +55,9 @@ enum LineCommand {
     /// Show how the PDOs of a node are set up
     #[command(subcommand)]
     Pdo(PdoLine),
+    /// Show all parameters of a node, or the differences between two
+    #[command(subcommand)]
+    Params(ParamsLine),
     #[command(flatten)]
     OnBus(Command),
 }
@@ -67,6 +71,13 @@ enum EmcyLine {
 #[derive(Debug, clap::Subcommand)]
 enum PdoLine {
     Show(ShowPdos),
+}
+
+/// What needs no file.
+#[derive(Debug, clap::Subcommand)]
+enum ParamsLine {
+    Backup(ShowParameters),
+    Diff(DiffNodes),
 }
 
 /// Reads lines for a host.
@@ -87,13 +98,11 @@ impl host::console::Reader for Reader {
         })?;
         let CommandLine { command } = CommandLine::from_arg_matches(&matches).map_err(|error| said(&error))?;
         let effect = match &command {
-            LineCommand::Read(_) | LineCommand::Objects(_) | LineCommand::Emcy(_) | LineCommand::Pdo(_) => {
-                CommandEffect::None
-            }
             LineCommand::OnBus(command) => {
                 check(command)?;
                 command.effect()
             }
+            _ => CommandEffect::None,
         };
         let asked = match effect {
             CommandEffect::None => None,
@@ -141,7 +150,7 @@ const ELSEWHERE: &[(&str, &[&str])] = &[
     ("Faults", &["emcy watch"]),
     ("Motion", &["drive-base", "group"]),
     ("PDO", &["pdo apply", "pdo plan", "pdo watch"]),
-    ("Parameters", &["dcf", "params"]),
+    ("Parameters", &["dcf", "params apply", "params plan", "params rollback", "params verify"]),
     ("Scope", &["capture", "record", "test-motion", "tune", "watch"]),
     ("Trace", &["dump", "send"]),
     ("World", &["events", "world"]),
@@ -250,6 +259,12 @@ async fn carry_out(command: &LineCommand, hands: Hands) -> Said {
         }
         LineCommand::Pdo(PdoLine::Show(show)) => {
             text_of(show.run(&context).await.map(|pdos| pdos.text(Paint::OFF)), &mut printed)
+        }
+        LineCommand::Params(ParamsLine::Backup(show)) => {
+            text_of(show.run(&context).await.map(|report| text_of_parameters(&report).to_owned()), &mut printed)
+        }
+        LineCommand::Params(ParamsLine::Diff(diff)) => {
+            text_of(diff.run(&context).await.map(|report| text_of_differences(&report, Paint::OFF)), &mut printed)
         }
         LineCommand::OnBus(command) => match command.run(&context).await {
             Ok(outcome) => {

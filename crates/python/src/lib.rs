@@ -53,6 +53,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(master::report::report, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_backup, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_compare, module)?)?;
+    module.add_function(wrap_pyfunction!(master::params::params_compare_nodes, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_apply, module)?)?;
     module.add_function(wrap_pyfunction!(master::params::params_rollback, module)?)?;
     module.add_class::<scenario::Sweep>()?;

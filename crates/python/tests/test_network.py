@@ -267,6 +267,7 @@ def test_the_base_of_the_file_goes_where_its_twist_leads():
         (["explain", "4"], lambda it: it.explain(4)),
         (["params", "backup", "4"], lambda it: it.params(4).backup()),
         (["params", "plan", "4"], lambda it: it.params(4).plan()),
+        (["params", "diff", "2", "4"], lambda it: it.params(2).diff(4)),
         (["params", "verify", "4"], lambda it: it.params(4).verify()),
         (["params", "apply", "4"], lambda it: it.params(4).apply()),
     ],

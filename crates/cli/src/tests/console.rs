@@ -179,6 +179,11 @@ fn a_line_says_in_a_page_what_it_says_in_a_shell() {
         "emcy show 1",
         "pdo show 4",
         "pdo show 9",
+        "params backup 4",
+        "params backup 9",
+        "params diff 4 2",
+        "params diff 4 4",
+        "params diff 4 9",
     ] {
         // As long as a page waits.
         let on_bus = ["--bus", &bus, "--timeout", "200ms"];
@@ -447,6 +452,8 @@ fn a_line_is_advised_of_nothing_that_it_does_not_have() {
         "objects",
         "emcy show",
         "pdo show",
+        "params backup",
+        "params diff",
     ] {
         let (text, status) = page.line(&format!("help {command}"));
         assert!(
@@ -483,8 +490,8 @@ fn a_line_knows_every_command_of_the_program() {
     }
     let (text, _) = page.line("pdo watch 4");
     assert!(text.contains("no command 'pdo watch'") && text.contains("the PDO view does that here"), "{text}");
-    let (text, _) = page.line("params backup 4");
-    assert!(text.contains("the Parameters view does that here; ferrodrive params, in a shell"), "{text}");
+    let (text, _) = page.line("params apply 4 wheel.toml");
+    assert!(text.contains("the Parameters view does that here; ferrodrive params apply, in a shell"), "{text}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ pub mod nmt;
 pub mod object;
 pub mod objects;
 mod on_bus;
+pub mod params;
 pub mod pdo;
 pub mod read;
 pub mod scan;

@@ -39,6 +39,11 @@ class _Jobs:
     def _compare(self, file: Optional[File], question: str) -> _native.Job:
         return _native.params_compare(*self._of, _path(file), question)
 
+    def _diff(self, other: Union[File, int, None]) -> _native.Job:
+        if isinstance(other, int):
+            return _native.params_compare_nodes(*self._of, other)
+        return self._compare(other, "diff")
+
     def _plan(self, file: Optional[File], address: bool) -> _native.Job:
         return self._compare(file, "plan with address" if address else "plan")
 
@@ -75,15 +80,19 @@ class Parameters(_Jobs):
         """
         return self._kept(self.network._finish(self._backup(file, force)), file, force)
 
-    def diff(self, file: Optional[File] = None) -> DiffReport:
-        """In what the node and a file differ; ``first`` is the node, ``second`` the file.
+    def diff(self, other: Union[File, int, None] = None) -> DiffReport:
+        """In what the node and a file, or another node, differ; ``first`` is the node, ``second`` the other.
 
-        :raises MasterError: the file cannot be read as parameters, or the node does not answer
+        :param other: a file, or a node-ID, 1 to 127. Of two nodes, what depends on the node-ID is compared as the first one's, and node-ID
+            and bit rate are left out
+        :raises MasterError: the file cannot be read as parameters, a node does not answer, or the other one's model is not known
 
         >>> parameters.diff("slow.toml")["differences"][0]["object"]
         '6081h:00'
+        >>> parameters.diff(5)["differences"]
+        []
         """
-        return cast(DiffReport, self.network._finish(self._compare(file, "diff")))
+        return cast(DiffReport, self.network._finish(self._diff(other)))
 
     def plan(self, file: Optional[File] = None, *, address: bool = False) -> ParametersPlan:
         """What :meth:`apply` would write, in its order; nothing is written.
@@ -163,9 +172,9 @@ class AsyncParameters(_Jobs):
         """As :meth:`Parameters.backup`."""
         return self._kept(await self.network._finish_soon(self._backup(file, force)), file, force)
 
-    async def diff(self, file: Optional[File] = None) -> DiffReport:
+    async def diff(self, other: Union[File, int, None] = None) -> DiffReport:
         """As :meth:`Parameters.diff`."""
-        return cast(DiffReport, await self.network._finish_soon(self._compare(file, "diff")))
+        return cast(DiffReport, await self.network._finish_soon(self._diff(other)))
 
     async def plan(self, file: Optional[File] = None, *, address: bool = False) -> ParametersPlan:
         """As :meth:`Parameters.plan`."""

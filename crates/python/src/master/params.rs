@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use devices::Description;
 use host::network::params::journal::{default_path, roll_back_by};
-use host::network::params::{Proof, Transaction, back_up, bytes_of, diff_of_node, plan_of, source, verify_node};
+use host::network::params::{
+    Proof, Transaction, back_up, bytes_of, diff_of_node, diff_of_nodes, plan_of, source, verify_node,
+};
 use machine::parameters::{Form, sheet};
 use master::parameters::Parameters;
 use pyo3::prelude::*;
@@ -99,6 +101,23 @@ pub(crate) fn params_compare(
             Question::Plan { address } => Value::report(&plan_of(&(), &drive, &wanted, name, address).await?),
             Question::Verify => Value::report(&verify_node(&drive, &wanted, name).await?),
         })
+    })
+}
+
+/// Compares two nodes.
+#[pyfunction]
+pub(crate) fn params_compare_nodes(
+    py: Python<'_>,
+    network: &Bound<'_, Network>,
+    node: u8,
+    model: Option<&str>,
+    other: u8,
+) -> PyResult<Job> {
+    let network = network.get();
+    let (first, second) = (AskedDrive::of(network, node, model)?, AskedDrive::of(network, other, None)?);
+    network.begin_said(py, async move {
+        let (first, second) = (first.drive().await?, second.drive().await?);
+        Ok(Value::report(&diff_of_nodes(&first, &second).await?))
     })
 }
 

@@ -93,6 +93,18 @@ pub async fn diff_of_node(drive: &Drive, wanted: &Parameters, second: String) ->
     Ok(DiffReport { first: format!("node {}", drive.node().id()), second, differences })
 }
 
+/// In what two nodes differ. What depends on the node-ID is compared as the first one's; node-ID and bit rate are left out, of which two
+/// nodes have two.
+///
+/// # Errors
+/// Silence; the model of the second is not known.
+pub async fn diff_of_nodes(first: &Drive, second: &Drive) -> Result<DiffReport, Failure> {
+    let (_, mut has, model) = super::back_up(&(), second).await?;
+    has.values.retain(|object, _| !model.storage.address.contains(object));
+    let wanted = has.for_node(first.node().id(), Some(model));
+    diff_of_node(first, &wanted, format!("node {}", second.node().id())).await
+}
+
 /// Whether a node has what a file says.
 #[derive(Debug, Serialize)]
 pub struct VerifyReport {

@@ -17,7 +17,9 @@ use serde::Serialize;
 
 pub(crate) use apply::refused as apply_refused;
 pub use apply::{ApplyReport, Proof, Rounded, Transaction};
-pub use compare::{Deviates, DiffReport, DiffRow, VerifyReport, diff_of_files, diff_of_node, verify_node};
+pub use compare::{
+    Deviates, DiffReport, DiffRow, VerifyReport, diff_of_files, diff_of_node, diff_of_nodes, verify_node,
+};
 pub use pre_operational::SeenBy;
 pub use shown::{Shown, name};
 
@@ -76,6 +78,15 @@ pub async fn back_up(
     let (refused, values) = (refused.collect(), backup.parameters.values.len());
     let report = BackupReport { node: node.raw(), file: None, parameters: None, values, refused };
     Ok((report, backup.parameters, model))
+}
+
+/// The same, the parameters in it as TOML.
+///
+/// # Errors
+/// See [`back_up`].
+pub async fn shown(progress: &impl Progress, drive: &Drive) -> Result<BackupReport, Failure> {
+    let (report, parameters, model) = back_up(progress, drive).await?;
+    Ok(BackupReport { parameters: Some(sheet::print(&parameters, Some(model))), ..report })
 }
 
 /// What a file of this form has.

@@ -1,7 +1,8 @@
 //! `ferrodrive params backup`.
 
-use host::network::params::{BackupReport, back_up, bytes_of};
-use machine::parameters::{Form, sheet};
+use console::command::params::{note_refused, text_of_parameters};
+use host::network::params::{BackupReport, back_up, bytes_of, shown};
+use machine::parameters::Form;
 use words::counted;
 
 use crate::command::configure::dcf::{keep, new_file, of_parameters};
@@ -18,15 +19,13 @@ impl super::Backup {
         let form = output.map(Form::of).transpose().map_err(Failure::usage)?;
         let output = new_file(output, self.force)?;
         let drive = context.known_drive(self.node).await?;
-        let (mut report, parameters, model) = back_up(&context.progress, &drive).await?;
         let Some((path, form)) = output.zip(form) else {
-            report.parameters = Some(sheet::print(&parameters, Some(model)));
+            let report = shown(&context.progress, &drive).await?;
             context.progress.clear();
-            for refused in &report.refused {
-                context.note(&format!("{} is not in the file: {}", refused.object, refused.why));
-            }
+            note_refused(&report, |note| context.note(note));
             return Ok(report);
         };
+        let (mut report, parameters, model) = back_up(&context.progress, &drive).await?;
         let bytes = match form {
             Form::Dcf => {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -42,8 +41,8 @@ impl super::Backup {
 
 impl Report for BackupReport {
     fn text(&self, _: Paint) -> String {
-        if let Some(parameters) = &self.parameters {
-            return parameters.trim_end().to_owned();
+        if self.parameters.is_some() {
+            return text_of_parameters(self).to_owned();
         }
         let file = self.file.as_deref().map(plain).unwrap_or_default();
         let mut text = format!("{file}: {} of node {}", counted(self.values, "value"), self.node);

@@ -1,7 +1,8 @@
 //! `ferrodrive params diff` and `verify`.
 
+use console::command::params::text_of_differences;
 use host::network::params::{
-    DiffReport, Shown, VerifyReport, back_up, diff_of_files, diff_of_node, source as files, verify_node,
+    DiffReport, VerifyReport, diff_of_files, diff_of_node, diff_of_nodes, source as files, verify_node,
 };
 use words::counted;
 
@@ -15,27 +16,22 @@ use plot::Table;
 
 impl super::Diff {
     pub(super) async fn run(&self, context: &Context) -> Result<DiffReport, Failure> {
-        let first = match (&self.first, &self.second) {
-            (NodeOrFile::Node(first), _) => *first,
-            (NodeOrFile::File(first), NodeOrFile::File(second)) => return Ok(diff_of_files(first, second)?),
+        match (&self.first, &self.second) {
+            (NodeOrFile::Node(first), NodeOrFile::Node(second)) => {
+                let first = context.drive(*first).await?;
+                Ok(diff_of_nodes(&first, &context.drive(*second).await?).await?)
+            }
+            (NodeOrFile::Node(first), NodeOrFile::File(file)) => {
+                let drive = context.drive(*first).await?;
+                let wanted = files::read(file, drive.description(), Some(*first))?;
+                Ok(diff_of_node(&drive, &wanted, file.display().to_string()).await?)
+            }
+            (NodeOrFile::File(first), NodeOrFile::File(second)) => Ok(diff_of_files(first, second)?),
             (NodeOrFile::File(file), NodeOrFile::Node(node)) => {
                 let failure = Failure::usage("the node is named first, then the file that it is compared with");
-                return Err(failure.next(format!("ferrodrive params diff {node} {}", file.display())));
+                Err(failure.next(format!("ferrodrive params diff {node} {}", file.display())))
             }
-        };
-        let drive = context.drive(first).await?;
-        let (wanted, whose) = match &self.second {
-            NodeOrFile::File(file) => {
-                (files::read(file, drive.description(), Some(first))?, file.display().to_string())
-            }
-            NodeOrFile::Node(second) => {
-                let (_, mut has, model) = back_up(&(), &context.drive(*second).await?).await?;
-                // Two nodes have two node-IDs.
-                has.values.retain(|object, _| !model.storage.address.contains(object));
-                (has.for_node(first, Some(model)), format!("node {second}"))
-            }
-        };
-        Ok(diff_of_node(&drive, &wanted, whose).await?)
+        }
     }
 }
 
@@ -49,16 +45,7 @@ impl super::Verify {
 
 impl Report for DiffReport {
     fn text(&self, paint: Paint) -> String {
-        let (first, second) = (plain(&self.first), plain(&self.second));
-        if self.differences.is_empty() {
-            return format!("{first} has the values of {second}");
-        }
-        let mut table = Table::new(&["object", "name", "first", "second"]);
-        for row in &self.differences {
-            let say = |shown: &Option<Shown>| shown.as_ref().map_or("-".to_owned(), |shown| plain(&shown.text));
-            table.row([row.object.clone(), row.name.unwrap_or_default().to_owned(), say(&row.first), say(&row.second)]);
-        }
-        format!("first   {first}\nsecond  {second}\n\n{}", table.plain(paint))
+        text_of_differences(self, paint)
     }
 }
 
