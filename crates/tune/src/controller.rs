@@ -6,7 +6,7 @@
 //!
 //! So what one count of a gain is worth is measured, and not taken from a manual that does not say it.
 
-use realfft::num_complex::Complex;
+use rustfft::num_complex::Complex;
 
 use crate::least_squares::fit;
 use crate::mechanics::Mechanics;

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::num_complex::Complex;
+use rustfft::num_complex::Complex;
 
 use crate::answer::Disturbance;
 use crate::controller::Loop;

@@ -5,9 +5,9 @@
 
 use std::f64::consts::TAU;
 
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use rustfft::num_complex::Complex;
 
+use crate::fourier::Fourier;
 use crate::samples::Unusable;
 
 /// Neighbouring frequencies are this far apart, relative: as far as a lightly damped resonance (damping of 1 %) is wide.
@@ -89,23 +89,15 @@ impl Excitation {
 /// off, and of what is left the phases are taken (E. Van der Ouderaa, J. Schoukens, J. Renneboog, "Peak factor minimization
 /// using a time-frequency domain swapping algorithm", IEEE Transactions on Instrumentation and Measurement 37, 1988).
 fn flattened(len: usize, lines: &[usize], mut spectrum: Vec<Complex<f64>>) -> Vec<f64> {
-    let mut planner = RealFftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(len), planner.plan_fft_inverse(len));
-    let (mut bins, mut values) = (forward.make_output_vec(), forward.make_input_vec());
-    let mut best = (f64::INFINITY, values.clone());
+    let fourier = Fourier::of(len);
+    let mut best = (f64::INFINITY, Vec::new());
     for _ in 0..SWAPS {
-        bins.fill(Complex::default());
-        lines.iter().zip(&spectrum).for_each(|(line, value)| bins[*line] = *value);
-        // Both fail where a length is wrong, and all are their own.
-        let done = inverse.process(&mut bins, &mut values);
-        assert!(done.is_ok(), "{done:?}");
+        let values = fourier.values(lines.iter().copied().zip(spectrum.iter().copied()));
         let peak = values.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
         if peak < best.0 {
             best = (peak, values.iter().map(|value| value / peak).collect());
         }
-        values.iter_mut().for_each(|value| *value = value.clamp(-CLIPPED * peak, CLIPPED * peak));
-        let done = forward.process(&mut values, &mut bins);
-        assert!(done.is_ok(), "{done:?}");
+        let bins = fourier.spectrum(values.iter().map(|value| value.clamp(-CLIPPED * peak, CLIPPED * peak)));
         for (line, value) in lines.iter().zip(&mut spectrum) {
             *value = Complex::from_polar(value.norm(), bins[*line].arg());
         }

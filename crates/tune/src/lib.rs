@@ -35,6 +35,7 @@ mod bode;
 mod controller;
 mod design;
 mod excitation;
+mod fourier;
 mod friction;
 mod least_squares;
 mod mechanics;
@@ -43,7 +44,7 @@ mod response;
 mod samples;
 
 /// Speed per current at one frequency.
-pub use realfft::num_complex::Complex;
+pub use rustfft::num_complex::Complex;
 
 pub use answer::Disturbance;
 pub use bode::bode;

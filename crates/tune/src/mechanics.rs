@@ -12,7 +12,7 @@
 
 use std::f64::consts::TAU;
 
-use realfft::num_complex::Complex;
+use rustfft::num_complex::Complex;
 
 use crate::least_squares::fit;
 use crate::response::{Line, Response};

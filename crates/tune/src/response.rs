@@ -13,10 +13,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use rustfft::num_complex::Complex;
 
 use crate::excitation::Excitation;
+use crate::fourier::Fourier;
 use crate::samples::{Samples, Unusable};
 
 /// Coherence from which a frequency counts. What is less coherent weighs less, and where the motor hardly moves, at an
@@ -218,7 +218,7 @@ pub(crate) fn held(half: f64) -> f64 {
 struct Spectra<'a> {
     samples: &'a Samples,
     window: Vec<f64>,
-    fft: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
+    fourier: Fourier,
     sums: Vec<Sums>,
 }
 
@@ -234,20 +234,14 @@ struct Sums {
 
 impl<'a> Spectra<'a> {
     fn new(samples: &'a Samples, len: usize, window: Vec<f64>) -> Self {
-        let fft = RealFftPlanner::new().plan_fft_forward(len);
-        Self { samples, window, fft, sums: vec![Sums::default(); len / 2 + 1] }
+        Self { samples, window, fourier: Fourier::of(len), sums: vec![Sums::default(); len / 2 + 1] }
     }
 
     /// The spectrum of a stretch, without its mean.
     fn spectrum(&self, value: impl Fn(usize) -> f64) -> Vec<Complex<f64>> {
         let len = self.window.len();
         let mean = (0..len).map(&value).sum::<f64>() / len as f64;
-        let mut input: Vec<_> = self.window.iter().enumerate().map(|(n, window)| window * (value(n) - mean)).collect();
-        let mut output = self.fft.make_output_vec();
-        // It fails where a length is wrong, and both are its own.
-        let done = self.fft.process(&mut input, &mut output);
-        assert!(done.is_ok(), "{done:?}");
-        output
+        self.fourier.spectrum(self.window.iter().enumerate().map(|(n, window)| window * (value(n) - mean)))
     }
 
     fn add(&mut self, start: usize) {
