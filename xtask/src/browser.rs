@@ -27,7 +27,7 @@ pub(crate) fn step() -> Tally {
     }
     // Three browsers at a time: each takes some hundred megabytes, and waits most of its time.
     let how = How { programs: 1, threads: 3, arguments: &arguments };
-    let tally = test_programs::build_and_run(SCHEMA_AND_BROWSER, how);
+    let tally = test_programs::of_processes(SCHEMA_AND_BROWSER, how);
     match without_axe {
         Some(reason) if tally.failed == 0 => {
             Tally { skipped: tally.skipped + 1, note: format!("{AXE}: {reason}"), ..tally }

@@ -1,4 +1,4 @@
-//! What judges the studio's page, from npm: nothing that is built needs it.
+//! What judges the studio's page and makes its module smaller, from npm: nothing that is built needs it.
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -102,6 +102,12 @@ pub(crate) const STEPS: &[TestStep] = &[
         run: page::step,
     },
     TestStep {
+        name: "web",
+        does: "the page without a server: runs equal to the native ones, in node and a browser",
+        when: When::Busy,
+        run: web::step,
+    },
+    TestStep {
         name: "studio",
         does: "the studio's page in a real browser: enable, move, jog, close the tab",
         when: When::Waiting,
@@ -131,12 +137,6 @@ pub(crate) const STEPS: &[TestStep] = &[
         // Last: by then the wheel that it installs is being built.
         when: When::Waiting,
         run: peers::run,
-    },
-    TestStep {
-        name: "web",
-        does: "the page without a server: runs equal to the native ones, in node and a browser; its compiler takes three minutes",
-        when: When::Named,
-        run: web::step,
     },
     TestStep {
         name: "aarch64",
@@ -201,15 +201,11 @@ pub(crate) fn tests_of(words: &[&str], arguments: &[&str]) -> Tally {
 }
 
 fn real_time() -> Tally {
-    // The program that they start.
-    if let Err(error) = program::built() {
-        return Tally::failed(error);
-    }
-    test_programs::build_and_run(REAL_TIME, WAITING)
+    test_programs::of_processes(REAL_TIME, WAITING)
 }
 
 fn schema() -> Tally {
-    test_programs::build_and_run(SCHEMA_AND_BROWSER, WAITING)
+    test_programs::of_processes(SCHEMA_AND_BROWSER, WAITING)
 }
 
 fn doctests() -> Tally {

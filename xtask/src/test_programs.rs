@@ -14,7 +14,7 @@ use crate::libtest::{self, Timed};
 use crate::say;
 use crate::table::seconds;
 use crate::tally::Tally;
-use crate::{process, workspace};
+use crate::{process, program, workspace};
 
 /// The tests that need processes and the clock, as `cargo test` selects them: beside packages whose features are those of the
 /// default members, so that what is built is shared.
@@ -81,6 +81,14 @@ fn program_of(message: Value) -> Option<Program> {
     let folder = Path::new(message["manifest_path"].as_str()?).parent()?.to_path_buf();
     let path = message["executable"].as_str().map(PathBuf::from)?;
     (message["profile"]["test"] == true).then_some(Program { path, folder })
+}
+
+/// Tests that start the program.
+pub(crate) fn of_processes(words: &[&str], how: How<'_>) -> Tally {
+    match program::built() {
+        Ok(_) => build_and_run(words, how),
+        Err(error) => Tally::failed(error),
+    }
 }
 
 /// Builds tests and runs them; shows how long each of the two took.
