@@ -27,7 +27,10 @@ pub(crate) fn tests(node: &mut Command, folder: &str) -> Tally {
     let mut tally = Tally::default();
     node.args(["--test", "--test-concurrency=1", "--test-reporter=tap", folder]);
     let ended = process::run(node, |line| match line.split_once("ok ") {
-        Some(("", test)) if test.contains(" # SKIP") => tally.skipped += 1,
+        Some(("", test)) if test.contains(" # SKIP") => {
+            tally.skipped += 1;
+            say(test);
+        }
         Some(("", _)) => tally.passed += 1,
         Some(("not ", name)) => {
             tally.failed += 1;

@@ -1,6 +1,8 @@
 // How the page reaches its host: over a WebSocket and requests to the studio that serves it, or, where the page names one, through a
 // worker of its own that holds virtual drives. Messages and requests are the same.
 
+import { kept } from "./settings.js";
+
 /** The worker of a page without a server. */
 const worker_at = globalThis.document?.documentElement.dataset.worker;
 /** The serial adapter that this tab has in place of virtual drives, in such a page. */
@@ -50,7 +52,7 @@ function inWorker(heard, closed) {
     if (data.text !== undefined) heard(data.text, data.sent_ms);
     else if (data.ended !== undefined) {
       // Not again and again: the next one is the first one.
-      if (data.refused) sessionStorage.removeItem("machine");
+      if (data.refused) goBack();
       if (serial) lose(`The host in this page has ended: ${data.ended}`);
       else lose(data.refused ? `The machine was refused. ${data.ended}` : `The virtual machine has ended, and begins anew: ${data.ended}`);
     } else if (data.event !== undefined) {
@@ -74,10 +76,21 @@ export const tellWorker = (message) => worker?.postMessage(message);
 /** The adapter, or the machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
 function machine() {
   if (serial) return { serial };
-  const kept = sessionStorage.getItem("machine");
-  const { machine: text, files } = kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
-  return { machine: text, files, stored: JSON.parse(localStorage.getItem(storeOf(text)) ?? "[]") };
+  const own = sessionStorage.getItem("machine");
+  const { machine: text, files } = own ? JSON.parse(own) : { machine: document.getElementById("machine").textContent, files: {} };
+  return { machine: text, files: filesOf(files), stored: kept(storeOf(text), []) };
 }
+
+/** What was there before a machine that was refused, once: the one before, or the page's own. */
+function goBack() {
+  const before = sessionStorage.getItem("machine-before");
+  sessionStorage.removeItem("machine-before");
+  if (before === null) sessionStorage.removeItem("machine");
+  else sessionStorage.setItem("machine", before);
+}
+
+/** Files as the machine takes them: text, or bytes that are kept as characters. */
+export const filesOf = (files) => Object.fromEntries(Object.entries(files).map(([name, one]) => [name, typeof one === "string" ? one : Uint8Array.from(one.bytes, (byte) => byte.charCodeAt(0))]));
 
 /** Where the browser keeps what the drives of a machine have stored. */
 export const storeOf = (machine) => `stored ${machine}`;

@@ -5,7 +5,11 @@
 function take() {
   const held = new URLSearchParams(location.hash.slice(1));
   const [machine, scenario] = [held.get("machine"), held.get("scenario")];
-  if (machine !== null) sessionStorage.setItem("machine", JSON.stringify({ machine, files: {} }));
+  if (machine !== null) {
+    sessionStorage.setItem("machine", JSON.stringify({ machine, files: {} }));
+    // Where it is refused, the page's own stands in for it.
+    sessionStorage.removeItem("machine-before");
+  }
   if (scenario !== null) sessionStorage.setItem("play", scenario);
   if (machine === null && scenario === null) return false;
   history.replaceState(null, "", location.pathname + location.search);

@@ -4,16 +4,22 @@ import { choice } from "./page/choice.js";
 import { h } from "./page/dom.js";
 import { link, on } from "./page/link.js";
 import { report } from "./page/main.js";
-import { storeOf, tellWorker } from "./page/transport.js";
+import { filesOf, storeOf, tellWorker } from "./page/transport.js";
 
 const given = JSON.parse(document.getElementById("given").textContent);
 const LARGEST_FILE = 2 ** 20;
 
 /** This tab has this machine from now on. With `keeps` its drives have what those of the machine before have stored. */
 function begin(machine, files = {}, keeps = false) {
-  const stored = localStorage.getItem(storeOf(present().machine));
-  if (keeps && stored) localStorage.setItem(storeOf(machine), stored);
-  sessionStorage.setItem("machine", JSON.stringify({ machine, files }));
+  try {
+    const stored = localStorage.getItem(storeOf(present().machine));
+    if (keeps && stored) localStorage.setItem(storeOf(machine), stored);
+    // Where the new one is refused, this one is there again.
+    sessionStorage.setItem("machine-before", JSON.stringify(present()));
+    sessionStorage.setItem("machine", JSON.stringify({ machine, files }));
+  } catch (error) {
+    return say(`The browser has no room for this machine: ${error.message}`, "bad");
+  }
   location.reload();
 }
 
@@ -53,7 +59,7 @@ function play({ title, text, files = {} }) {
     show(title, Object.keys(files).length ? null : text, data);
   };
   worker.onerror = (event) => say(`${title}: ${event.message ?? "it cannot be run"}`);
-  worker.postMessage({ scenario: text, files });
+  worker.postMessage({ scenario: text, files: filesOf(files) });
 }
 
 /** `text` is the scenario, if it is all in one file. */
@@ -92,19 +98,29 @@ async function copy(what, text) {
   }
 }
 
+/** A data sheet as it is kept: its text, or its bytes, of which each is a character, where it is not UTF-8. */
+async function sheet(file) {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  try {
+    return new TextDecoder("utf-8", { fatal: true, ignoreBOM: true }).decode(bytes);
+  } catch {
+    return { bytes: Array.from(bytes, (byte) => String.fromCharCode(byte)).join("") };
+  }
+}
+
 /** Machine files, scenarios and data sheets that are dropped or chosen. */
 async function take(files) {
   const sheets = {};
   let file_of = null;
   for (const file of files) {
     if (file.size > LARGEST_FILE) return say(`${file.name} has ${file.size} bytes; at most ${LARGEST_FILE} are read`, "bad");
-    if (/\.(eds|dcf)$/i.test(file.name)) sheets[file.name] = await file.text();
+    if (/\.(eds|dcf)$/i.test(file.name)) sheets[file.name] = await sheet(file);
     else if (/\.toml$/i.test(file.name)) {
       if (file_of) return say(`${file.name}: expected one machine file or scenario, beside ${file_of.title}`, "bad");
       file_of = { title: file.name, text: await file.text() };
     } else return say(`${file.name}: expected a machine file or scenario (.toml), or a data sheet (.eds, .dcf)`, "bad");
   }
-  if (file_of && /^\s*\[machine\]/m.test(file_of.text)) return play({ ...file_of, files: { ...present().files, ...sheets } });
+  if (file_of && /^\s*(\[machine\]|machine\s*=|\[\[step\]\])/m.test(file_of.text)) return play({ ...file_of, files: { ...present().files, ...sheets } });
   if (file_of) return begin(file_of.text, { ...present().files, ...sheets });
   // A device joins the machine at the next free node-ID.
   const { machine, files: kept } = present();
@@ -146,6 +162,8 @@ addEventListener("stored", ({ detail: { image, kept } }) => {
   try {
     const others = JSON.parse(localStorage.getItem(key) ?? "[]").filter(({ number }) => number !== image.number);
     localStorage.setItem(key, JSON.stringify([...others, image]));
+    // Else a browser that is short of room may drop it.
+    navigator.storage?.persist?.();
     forget.hidden = false;
   } catch (error) {
     report("Storage", { ok: false, error: { message: `what drive ${image.number} has stored lasts as long as this page: the browser does not keep it (${error.message})` } });

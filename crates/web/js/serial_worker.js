@@ -13,6 +13,9 @@ const PAUSE_MS = 1000;
 /** How long bytes may wait for an adapter that takes none. */
 const STUCK_MS = 1000;
 
+/** A page that loads is not silent. */
+const LOADING_MS = 500;
+
 let library = null;
 let setting = null;
 /** The open port: `{ port, writer, reader, outbox, writing_since, flushing }`. */
@@ -178,7 +181,9 @@ function tick() {
 async function open({ serial }) {
   if (!library) {
     await hold();
+    const loading = setInterval(() => postMessage({ event: "loading" }), LOADING_MS);
     const made = await Library.make();
+    clearInterval(loading);
     setting = serial;
     made.call({ call: "open_serial", name: serial.name, bitrate: serial.bitrate, unix_ms: Math.round(performance.timeOrigin), now_ns: now_ns() });
     library = made;

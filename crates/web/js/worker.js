@@ -3,6 +3,7 @@
 // What stops a motion that is not held is in here, so a page that is hidden, hangs or is gone stops what it moved.
 
 import { World } from "./ferrodrive.js";
+import { WakingClock } from "./waking_clock.js";
 
 /** How often the world is moved on. */
 const TICK_MS = 5;
@@ -14,7 +15,12 @@ const MOST_BEHIND_MS = 250;
 /** How often time that is left out is said. */
 const SAY_MS = 1000;
 
+/** A page that loads is not silent. */
+const LOADING_MS = 500;
+
 let world = null;
+/** The time in which the machine slept counts. */
+const clock = new WakingClock();
 /** What the clock showed at the world's zero. */
 let zero_ms = 0;
 
@@ -40,7 +46,7 @@ function saySkipped() {
 }
 
 function tick() {
-  const behind = performance.now() - zero_ms - world.now * 1000;
+  const behind = clock.read() - zero_ms - world.now * 1000;
   if (behind > MOST_BEHIND_MS) skip(behind - MOST_MS);
   saySkipped();
   try {
@@ -63,8 +69,10 @@ const keep = (image) =>
 async function open({ machine, files, stored }) {
   if (world) return world.join();
   const onunusable = (why) => postMessage({ event: "unusable", detail: why });
+  const loading = setInterval(() => postMessage({ event: "loading" }), LOADING_MS);
   world = await World.open(machine, { files, stored, unix_ms: Date.now(), onmessage: (text) => postMessage({ text }), onstored: keep, onunusable });
-  zero_ms = performance.now() - world.now * 1000;
+  clearInterval(loading);
+  zero_ms = clock.read() - world.now * 1000;
   setInterval(tick, TICK_MS);
 }
 

@@ -22,7 +22,7 @@ const drives = (count) => until(`${count} drives`, `return document.querySelecto
 const drop = (files) =>
   run(
     `const data = new DataTransfer();
-     for (const [name, text] of arguments[0]) data.items.add(new File([text], name));
+     for (const [name, content] of arguments[0]) data.items.add(new File([typeof content === "string" ? content : Uint8Array.from(content)], name));
      window.dispatchEvent(new DragEvent("drop", { dataTransfer: data, cancelable: true }));
      return true`,
     files,
@@ -246,6 +246,14 @@ test("a data sheet that is dropped on the page joins the machine at the next fre
   await drop([["mine.eds", io]]);
   await until("node 3 among four drives", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5'");
   await picture("eds");
+  // One that is not UTF-8: it is taken as the native program takes it.
+  const latin = [...Buffer.from(io.replace(/^VendorName=.*$/m, "VendorName=Gerätebau"), "latin1")];
+  await drop([["latin.eds", latin]]);
+  await until("node 5 too", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5,6'");
+  // One of another encoding is refused, and the machine stays as it was.
+  await drop([["wide.eds", [0xff, 0xfe, ...Buffer.from(io, "utf16le")]]]);
+  await until("why", "return /refused.*UTF-16/s.test(document.getElementById('machine-status').innerText)");
+  await until("the machine before", "return [...document.querySelectorAll('#view table tbody tr')].length === 6");
 });
 
 test("that of a servo turns, beside node-IDs that are written as they please, and what a sheet says is text", async () => {

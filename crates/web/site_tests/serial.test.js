@@ -63,6 +63,9 @@ async function attach(bitrate = "500k") {
   await run("document.getElementById('serial-choose').click(); return true");
 }
 
+/** Something that happens to the machine, as its worker sees it. */
+const happens = (what) => run("const channel = new BroadcastChannel('emulated'); channel.postMessage(arguments[0]); channel.close(); return true", what);
+
 /** A person presses the button beside what may be moving. */
 const see = () => run("document.querySelector('#serial-alert button').click(); return true");
 
@@ -181,6 +184,13 @@ test("a page that hangs is stopped by its worker, and takes no state that has wa
   await found();
 });
 
+test("a machine that slept stops what moved when it wakes, also where the steady clock stood still", async () => {
+  await turn();
+  await happens({ slept_ms: 20_000 });
+  await stops();
+  await until("the reason", `return /slept/.test(document.getElementById("serial-alert").innerText)`);
+});
+
 test("an adapter that answers BEL ends what moves", async () => {
   await turn();
   adapter.refuses = true;
@@ -243,6 +253,10 @@ test("another tab does not take the adapter away", async () => {
 
 test("a tab that is closed, and one that takes leave, stop what they moved", async () => {
   await found();
+  await turn();
+  // What a page that is left says to its worker, while that still runs.
+  await run("dispatchEvent(new PageTransitionEvent('pagehide')); return true");
+  await stops();
   await turn();
   await run("location.reload(); return true").catch(() => {});
   // By the page; where the browser ends its worker before that has sent the stop, by its own watch.

@@ -8,6 +8,13 @@ import { connect } from "node:net";
 const MOCK = `
 {
   if (location.search === "?lacking") delete Navigator.prototype.serial;
+  // What the test has happen: the machine sleeps, and its steady clock stands still meanwhile. The page's own clock dates what comes.
+  if (!globalThis.document) {
+    let slept_ms = 0;
+    const wall = Date.now;
+    Date.now = () => wall() + slept_ms;
+    new BroadcastChannel("emulated").onmessage = ({ data }) => (slept_ms += data.slept_ms);
+  }
   const lost = (why) => new DOMException(why, "NetworkError");
   class Port {
     getInfo() {
