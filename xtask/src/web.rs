@@ -186,14 +186,11 @@ fn make(rust: &Rust, folder: &Path) -> Result<Made, String> {
     let mut cargo = rust.cargo(&words);
     builder::leave_out(&mut cargo);
     quietly(cargo.arg("--").arg(format!("-Clink-arg=--max-memory={MOST_MEMORY}")))?;
-    let (mut module, small) = (rust.built(PROFILE).join("web.wasm"), self::folder().join("ferrodrive.wasm"));
-    let optimised = optimised(&module, &self::folder().join("optimised.wasm"));
-    let left_large = match optimised {
-        Ok(optimised) => {
-            module = optimised;
-            (!rust.is_made()).then(|| "the standard library is the toolchain's own, which is larger".into())
-        }
-        Err(why) => Some(why),
+    let (built, small) = (rust.built(PROFILE).join("web.wasm"), self::folder().join("ferrodrive.wasm"));
+    let own = || (!rust.is_made()).then(|| "the standard library is the toolchain's own, which is larger".into());
+    let (module, left_large) = match optimised(&built, &self::folder().join("optimised.wasm")) {
+        Ok(optimised) => (optimised, own()),
+        Err(why) => (built, Some(why)),
     };
     let unordered = match site::ordered(&module) {
         Ok(ordered) => {

@@ -65,7 +65,7 @@ function inWorker(heard, closed) {
     }
   };
   mine.onerror = (event) => lose(event.message ?? "it cannot be loaded");
-  mine.postMessage({ open: true, ...machine() });
+  mine.postMessage({ open: true, ...opened() });
   begun();
   return { isOpen: () => worker === mine, send: (text) => mine.postMessage({ say: text }), close: () => {} };
 }
@@ -73,15 +73,20 @@ function inWorker(heard, closed) {
 /** Hands a message to the worker, behind those before. */
 export const tellWorker = (message) => worker?.postMessage(message);
 
-/** The adapter, or the machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
-function machine() {
-  if (serial) return { serial };
+/** The machine file that this tab keeps, and data sheets that it names; a base with two wheels, and two axes, at first. */
+export function present() {
   const own = sessionStorage.getItem("machine");
-  const { machine: text, files } = own ? JSON.parse(own) : { machine: document.getElementById("machine").textContent, files: {} };
-  return { machine: text, files: filesOf(files), stored: kept(storeOf(text), []) };
+  return own ? JSON.parse(own) : { machine: document.getElementById("machine").textContent, files: {} };
 }
 
-/** What was there before a machine that was refused, once: the one before, or the page's own. */
+/** What a worker is to open: the adapter, or the machine with what its drives have stored. */
+function opened() {
+  if (serial) return { serial };
+  const { machine, files } = present();
+  return { machine, files: filesOf(files), stored: storedOf(machine) };
+}
+
+/** Goes back from a machine that was refused to the one before it, or to the page's own. */
 function goBack() {
   const before = sessionStorage.getItem("machine-before");
   sessionStorage.removeItem("machine-before");
@@ -94,6 +99,7 @@ export const filesOf = (files) => Object.fromEntries(Object.entries(files).map((
 
 /** Where the browser keeps what the drives of a machine have stored. */
 export const storeOf = (machine) => `stored ${machine}`;
+export const storedOf = (machine) => kept(storeOf(machine), []);
 
 /**
  * A request to the host: `fetch` with a path.

@@ -4,7 +4,7 @@ import { choice } from "./page/choice.js";
 import { h } from "./page/dom.js";
 import { link, on } from "./page/link.js";
 import { report } from "./page/main.js";
-import { filesOf, storeOf, tellWorker } from "./page/transport.js";
+import { filesOf, present, storeOf, storedOf, tellWorker } from "./page/transport.js";
 
 const given = JSON.parse(document.getElementById("given").textContent);
 const LARGEST_FILE = 2 ** 20;
@@ -21,12 +21,6 @@ function begin(machine, files = {}, keeps = false) {
     return say(`The browser has no room for this machine: ${error.message}`, "bad");
   }
   location.reload();
-}
-
-/** The machine of this tab. */
-function present() {
-  const kept = sessionStorage.getItem("machine");
-  return kept ? JSON.parse(kept) : { machine: document.getElementById("machine").textContent, files: {} };
 }
 
 const status = h("span", { role: "status", id: "machine-status" });
@@ -158,10 +152,10 @@ document.getElementById("top").append(
 
 // What a drive stores is kept by the browser for the machine, and acknowledged by the drive when it is.
 addEventListener("stored", ({ detail: { image, kept } }) => {
-  const key = storeOf(present().machine);
+  const { machine } = present();
   try {
-    const others = JSON.parse(localStorage.getItem(key) ?? "[]").filter(({ number }) => number !== image.number);
-    localStorage.setItem(key, JSON.stringify([...others, image]));
+    const others = storedOf(machine).filter(({ number }) => number !== image.number);
+    localStorage.setItem(storeOf(machine), JSON.stringify([...others, image]));
     // Else a browser that is short of room may drop it.
     navigator.storage?.persist?.();
     forget.hidden = false;

@@ -2,8 +2,8 @@
 
 const NAME = `ferrodrive ${VERSION}`;
 
+// Without skipWaiting(): a new version waits until no page of the old one is open, and no page has files of both.
 addEventListener("install", (event) => {
-  // A new version waits until no page of the old one is open: theirs are the files of one version.
   // What the page has just loaded is asked for anew, and not sent again where the host knows that it is the same.
   event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(FILES.map((file) => new Request(file, { cache: "no-cache" })))));
 });

@@ -4,6 +4,7 @@
 // worker are pumped by the page.
 
 import { FerrodriveError, Library } from "./ferrodrive.js";
+import { whileLoading } from "./loading.js";
 import { WakingClock } from "./waking_clock.js";
 
 /** How often time passes. */
@@ -12,9 +13,6 @@ const TICK_MS = 5;
 const PAUSE_MS = 1000;
 /** How long bytes may wait for an adapter that takes none. */
 const STUCK_MS = 1000;
-
-/** A page that loads is not silent. */
-const LOADING_MS = 500;
 
 let library = null;
 let setting = null;
@@ -181,9 +179,7 @@ function tick() {
 async function open({ serial }) {
   if (!library) {
     await hold();
-    const loading = setInterval(() => postMessage({ event: "loading" }), LOADING_MS);
-    const made = await Library.make();
-    clearInterval(loading);
+    const made = await whileLoading(Library.make());
     setting = serial;
     made.call({ call: "open_serial", name: serial.name, bitrate: serial.bitrate, unix_ms: Math.round(performance.timeOrigin), now_ns: now_ns() });
     library = made;

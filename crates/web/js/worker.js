@@ -3,6 +3,7 @@
 // What stops a motion that is not held is in here, so a page that is hidden, hangs or is gone stops what it moved.
 
 import { World } from "./ferrodrive.js";
+import { whileLoading } from "./loading.js";
 import { WakingClock } from "./waking_clock.js";
 
 /** How often the world is moved on. */
@@ -15,11 +16,8 @@ const MOST_BEHIND_MS = 250;
 /** How often time that is left out is said. */
 const SAY_MS = 1000;
 
-/** A page that loads is not silent. */
-const LOADING_MS = 500;
-
 let world = null;
-/** The time in which the machine slept counts. */
+/** The time in which the computer slept counts. */
 const clock = new WakingClock();
 /** What the clock showed at the world's zero. */
 let zero_ms = 0;
@@ -69,9 +67,7 @@ const keep = (image) =>
 async function open({ machine, files, stored }) {
   if (world) return world.join();
   const onunusable = (why) => postMessage({ event: "unusable", detail: why });
-  const loading = setInterval(() => postMessage({ event: "loading" }), LOADING_MS);
-  world = await World.open(machine, { files, stored, unix_ms: Date.now(), onmessage: (text) => postMessage({ text }), onstored: keep, onunusable });
-  clearInterval(loading);
+  world = await whileLoading(World.open(machine, { files, stored, unix_ms: Date.now(), onmessage: (text) => postMessage({ text }), onstored: keep, onunusable }));
   zero_ms = clock.read() - world.now * 1000;
   setInterval(tick, TICK_MS);
 }

@@ -246,10 +246,12 @@ test("a data sheet that is dropped on the page joins the machine at the next fre
   await drop([["mine.eds", io]]);
   await until("node 3 among four drives", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5'");
   await picture("eds");
-  // One that is not UTF-8: it is taken as the native program takes it.
-  const latin = [...Buffer.from(io.replace(/^VendorName=.*$/m, "VendorName=Gerätebau"), "latin1")];
+  // One that is not UTF-8: the machine is given its bytes.
+  const latin = [...Buffer.from(io.replace("Ferrodrive CiA 401 input and output module", "Gerät"), "latin1")];
   await drop([["latin.eds", latin]]);
-  await until("node 5 too", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5,6'");
+  await until("node 6 too", "return [...document.querySelectorAll('#view table tbody tr')].map((row) => parseInt(row.innerText)).join() === '1,2,3,4,5,6'");
+  const handed = await run(`${MODULES} const { filesOf, present } = modules["transport.js"]; return [...filesOf(present().files)["latin.eds"]]`);
+  assert.deepEqual(handed, latin);
   // One of another encoding is refused, and the machine stays as it was.
   await drop([["wide.eds", [0xff, 0xfe, ...Buffer.from(io, "utf16le")]]]);
   await until("why", "return /refused.*UTF-16/s.test(document.getElementById('machine-status').innerText)");
